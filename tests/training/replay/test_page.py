@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
 from posse_training.replay.page import page
+from posse_training.replay.words import verdict
 
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])
@@ -62,8 +64,17 @@ class Tags(HTMLParser):
 def test_a_page_loads_nothing() -> None:
     for tag, attributes in Tags(page(short())).tags:
         assert tag not in ("link", "iframe", "img", "object", "base")
-        assert not {"src", "href", "style"} & set(attributes)
+        assert not {"src", "style", *(["href"] if tag != "a" else [])} & set(attributes)
         assert not [name for name in attributes if name.startswith("on")]
+
+
+def test_a_page_describes_itself_for_a_preview_and_links_the_project() -> None:
+    tags = Tags(page(short())).tags
+    told = {one.get("name") or one.get("property"): one.get("content") for tag, one in tags if tag == "meta"}
+    assert told["description"] == told["og:description"] == verdict(short())
+    assert told["og:title"] == "ddcs-distributed and pursuit on field"
+    pyproject = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())
+    assert [one["href"] for tag, one in tags if tag == "a"] == [pyproject["project"]["urls"]["Repository"]]
 
 
 def test_nothing_of_a_hostile_name_is_markup() -> None:

@@ -24,6 +24,17 @@ def close(column: Any, frame: int, value: Any, angle: bool = False) -> None:
     assert np.abs(off).max(initial=0) <= allowed
 
 
+def test_the_pose_that_a_tracker_believes_is_the_one_that_it_observes() -> None:
+    columns = decode(*encode(record(["ddcs-distributed"], "robots", seconds=20))).players[0].columns
+    places, ways = (columns[f"observation/{name}"].values for name in ("position", "heading"))
+    for k, name in enumerate("xy"):
+        np.testing.assert_allclose(columns[f"believed_{name}"].values, places[..., k], rtol=0, atol=0.0011)
+        assert np.abs(columns[f"believed_{name}"].values - columns[f"tracker_{name}"].values).max() > 0.05
+    off = columns["believed_heading"].values - np.arctan2(ways[..., 1], ways[..., 0])
+    assert np.abs((off + np.pi) % (2 * np.pi) - np.pi).max() < 0.003
+    assert "believed_x" not in short().players[0].columns
+
+
 @pytest.mark.parametrize(
     ("policy", "scenario"), [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss")]
 )

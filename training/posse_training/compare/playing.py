@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from posse import Family, Scenario
-from posse_baselines import Policy, PolicyError, load
+from posse_baselines import Policy, PolicyError
 from posse_training.compare.contenders import Contender, check_code
 from posse_training.compare.plays import Plays
 from posse_training.errors import PlayError, TimeLimitError, describe
@@ -122,8 +122,7 @@ def _evaluate(policy: str | Policy, scenario: Scenario | Family, episodes: int, 
 
 def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:
     try:
-        loaded = load(policy) if isinstance(policy, str) else policy
         played: dict[str, Any] = {"target": game.target, "seed": game.seed, "split": game.split}
-        return record([(label, loaded)], scenario, world=world, observations=False, **played)
+        return record([(label, policy)], scenario, world=world, observations=False, **played)
     except Exception as error:
         raise PlayError(describe(error)) from None

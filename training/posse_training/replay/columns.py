@@ -8,6 +8,7 @@ tracker_heading            (N,) rad          its heading, without jumps of 2π
 tracker_sees               (N,)              1: its own sensor sees the target
 tracker_slot               (N,)              the slot that it occupies; -1: none
 tracker_onsets             (N,)              contacts that began in this step
+believed_x, _y, _heading   (N,) m, rad       the pose in which it believes to be. Omitted if poses do not drift
 tracker_broken             (N,)              1: it is broken
 tracker_sensor_dead        (N,)              1: its target sensor is in an outage
 tracker_radio_dead         (N,)              1: its radio is in an outage
@@ -53,6 +54,7 @@ STATES: Final = (
     *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
     *("tracker_sees", "tracker_slot", "tracker_onsets"),
     *("tracker_broken_at", "tracker_sensor_dead_from", "tracker_radio_dead_from"),
+    *("odometry_x", "odometry_y", "odometry_heading"),
     *("tracker_fix_step", "tracker_fix_x", "tracker_fix_y", "tracker_fix_cos", "tracker_fix_sin", "heard_step"),
     *("world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin"),
     *("world_frame_cos", "world_frame_sin", "world_pressed", "world_score"),
@@ -141,6 +143,10 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
         "target_dart": Column((states["world_pressed"] < 0).astype(np.int8)),
         "score": Column(states["world_score"], _SCORE),
     }
+    if states["odometry_x"].size:
+        for name, unit in (("x", "m"), ("y", "m"), ("heading", "rad")):
+            true = columns[f"tracker_{name}"].values
+            columns[f"believed_{name}"] = Column(true + states[f"odometry_{name}"], _FINE, unit)
     if states["heard_step"].size:
         columns["heard_step"] = Column(states["heard_step"])
     return columns

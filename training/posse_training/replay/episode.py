@@ -61,6 +61,7 @@ class Player:
         events: Events in order of time.
         metrics: Every metric of the recorded part of the episode; nan: never happened.
         about: Description of the policy, such as the card of a learned one; plain JSON.
+        argument: What ``posse replay`` is given to play it; empty: it is no name or file.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Player:
     events: tuple[Event, ...] = ()
     metrics: dict[str, float] = field(default_factory=dict)
     about: dict[str, Any] = field(default_factory=dict)
+    argument: str = ""
 
     @property
     def frames(self) -> int:

@@ -43,8 +43,8 @@ def encode(replay: Replay) -> tuple[str, bytes]:
             columns.append(described)
             parts.append(packed)
         events = [astuple(event) for event in player.events]
-        about = {"name": player.name, "frames": player.frames, "metrics": player.metrics, "about": player.about}
-        players.append({**about, "events": events, "columns": columns})
+        own = {key: getattr(player, key) for key in ("name", "frames", "metrics", "about", "argument")}
+        players.append({**own, "events": events, "columns": columns})
     header = {"format": FORMAT, "world": replay.world, "players": players}
     text = json.dumps(_to_json(header), separators=(",", ":"), allow_nan=False)
     return text, zlib.compress(b"".join(parts), 9)
@@ -69,7 +69,8 @@ def decode(header: str, data: bytes) -> Replay:
             columns[column["name"]] = _unpack(column, player["frames"], raw[start:end])
             start = end
         events = tuple(Event(step, kind, text, tuple(robots)) for step, kind, text, robots in player["events"])
-        players.append(Player(player["name"], columns, events, player["metrics"], player["about"]))
+        own = [player[key] for key in ("metrics", "about", "argument")]
+        players.append(Player(player["name"], columns, events, *own))
     return Replay(described["world"], tuple(players))
 
 

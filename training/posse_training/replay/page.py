@@ -20,17 +20,19 @@ from posse_baselines.files import write_atomically
 from posse_training.errors import SettingsError
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
+from posse_training.replay.words import command, verdict
 
+PROJECT: Final = "https://github.com/posse-benchmark/posse"  # as in pyproject.toml
 TASK_COLOURS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), (0, 114, 178), (0, 158, 115), (240, 228, 66))
 """Of the tasks of a tracker, in the order of ``posse_baselines.ddcs.TASKS``. The last is not Okabe and Ito's pink,
 which deuteranopia maps to the grey of a tracker."""
-PLAYERS: Final[tuple[style.Colour, ...]] = ((0, 114, 178), (213, 120, 0), (40, 165, 130), style.INK)
-"""Of the teams compared in one replay or film, left to right."""
+PLAYERS: Final[tuple[style.Colour, ...]] = ((0, 114, 178), style.INK, (40, 165, 130), (140, 60, 160))
+"""Of the teams compared in one replay or film, left to right: none is near the vermilion of target and slots."""
 MODULES: Final = tuple(
     f"{name}.js"
     for name in (
         *("data", "state", "drawing", "camera", "ground", "sensing", "robots", "view", "timeline"),
-        *("text", "panel", "export", "legend", "controls", "main"),
+        *("text", "panel", "legend", "controls", "main"),
     )
 )
 """Modules of the page's code, each after those that it imports from."""
@@ -90,6 +92,9 @@ def page(replay: Replay) -> str:
     names = " and ".join(player.name for player in replay.players)
     values = {
         "title": html.escape(f"{names} on {replay.world['scenario']}"),
+        "verdict": html.escape(verdict(replay)),
+        "command": html.escape(command(replay)),
+        "project": PROJECT,
         "style": _file("style.css"),
         "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
         "header": _as_data(header),

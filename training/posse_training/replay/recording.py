@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy.typing as npt
@@ -25,7 +26,7 @@ _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working
 
 
 def record(
-    policies: Sequence[str | Policy | tuple[str, Policy]],
+    policies: Sequence[str | Policy | tuple[str, str | Policy]],
     scenario: str | Scenario = "smart",
     *,
     target: str | Target | None = None,
@@ -40,7 +41,7 @@ def record(
 
     Args:
         policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
-            (label, policy).
+            (label, name or policy).
         scenario: Scenario or its name; ``message_size`` is raised to that of each policy.
         target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
             scenario's own motion.
@@ -55,23 +56,43 @@ def record(
         SettingsError: No policy, more than four, ``seconds`` not above 0.
         PolicyError, ScenarioError: An argument that is unknown, invalid, or does not fit the scenario.
     """
-    settings = get_scenario(scenario, **overrides)
+    settings = own = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)
     if not 1 <= len(policies) <= MOST_PLAYERS:
         raise SettingsError(f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies")
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
     steps = settings.horizon if seconds is None else max(1, round(seconds / settings.control_step))
+    options = _options(own, observations, target=target, world=world, seed=seed, split=split, seconds=seconds)
     replays = []
     for given in policies:
         label, policy = given if isinstance(given, tuple) else (None, given)
+        argument = policy if isinstance(policy, str) else ""
         if isinstance(policy, str):
             policy = load(policy)
         place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
         batch = batch_for(policy, settings, 1, opponent, **place, autoreset="disabled")
         played = rollout(batch, policy, RECORD, steps=steps)
-        replays.append(replay_of(played, label or policy.name, observations=observations, about=_about(policy)))
+        one = replay_of(played, label or policy.name, observations=observations, about=_about(policy))
+        players = tuple(replace(player, argument=argument) for player in one.players)
+        replays.append(Replay(one.world | {"options": options}, players))
     return join(replays)
+
+
+def _options(scenario: Scenario, observations: bool, **played: object) -> list[str] | None:
+    """Return the options with which ``posse replay`` plays this world; ``None``: it has none for some setting."""
+    named = get_scenario(scenario.name) if scenario.name in scenario_names() else None
+    is_given = isinstance(played["target"], str | None)
+    if named is None or not is_given or scenario != named.replace(num_trackers=scenario.num_trackers):
+        return None
+    options = {"scenario": scenario.name, **played}
+    if scenario.num_trackers != named.num_trackers:
+        options["num-trackers"] = scenario.num_trackers
+    words: list[str] = []
+    for name, value in options.items():
+        if value is not None:
+            words += [f"--{name}", f"{value:.10g}" if isinstance(value, float) else str(value)]
+    return words if observations else [*words, "--no-observations"]
 
 
 def replay_of(

@@ -65,7 +65,7 @@ export class Camera {
   // What to draw with: project and unproject between metres and pixels.
   look(position, others) {
     let { x, y, scale } = this.free ?? this.own(position);
-    if (app.linked && !this.free) scale = Math.min(...others.map((camera) => camera.own(position).scale));
+    if (!this.free) scale = Math.min(...others.map((camera) => camera.own(position).scale));
     if (app.follow) {
       const n = app.world.settings.num_trackers;
       const robot = app.selected ?? n;
@@ -86,11 +86,10 @@ export class Camera {
   }
 }
 
-// Zoom about a pixel and move by pixels, in one view or, where they are linked, in all.
-export function moveCameras(cameras, moved, factor, about, dx, dy) {
+// Zoom about a pixel and move by pixels, in all views.
+export function moveCameras(cameras, factor, about, dx, dy) {
   const looks = cameras.map((camera) => camera.look(app.position, cameras));
   cameras.forEach((camera, k) => {
-    if (camera !== moved && !app.linked) return;
     const look = looks[k];
     const scale = Math.max(2, Math.min(2000, look.scale * factor));
     const [wx, wy] = look.unproject(...about);

@@ -1,6 +1,5 @@
 // Buttons, keys, pointers.
 import { moveCameras } from "./camera.js";
-import { savePicture, toggleFilm } from "./export.js";
 import { toggleLegend } from "./legend.js";
 import { SPEEDS, app, listen, play, seconds, seek, select, set } from "./state.js";
 import { robotAt } from "./view.js";
@@ -21,11 +20,6 @@ function jump(direction) {
   if (ahead.length) seek(direction > 0 ? Math.min(...ahead) : Math.max(...ahead));
 }
 
-function changeSpeed(by) {
-  const next = SPEEDS[SPEEDS.indexOf(app.speed) + by];
-  if (next) set({ speed: next });
-}
-
 function fit(cameras) {
   for (const camera of cameras) camera.free = null;
   set({ follow: false });
@@ -39,14 +33,11 @@ export function connectControls(cameras) {
     play: () => play(),
     forth: () => seek(app.position + 1),
     follow: () => set({ follow: !app.follow }),
-    linked: () => set({ linked: !app.linked }),
     fit: () => fit(cameras),
     links: () => toggleLayer("links"),
     sensing: () => toggleLayer("sensing"),
     trails: () => toggleLayer("trails"),
     help: toggleLegend,
-    png: savePicture,
-    webm: toggleFilm,
     more: () => {
       document.body.classList.toggle("no-panel");
       dispatchEvent(new Event("resize"));
@@ -64,18 +55,13 @@ export function connectControls(cameras) {
     Home: actions.start,
     End: () => seek(app.last),
     Escape: () => select(null),
-    "[": () => changeSpeed(-1),
-    "]": () => changeSpeed(1),
     n: () => jump(1),
     b: () => jump(-1),
     f: actions.follow,
-    c: actions.linked,
     r: actions.fit,
     l: actions.links,
     s: actions.sensing,
     t: actions.trails,
-    p: savePicture,
-    v: toggleFilm,
     "?": toggleLegend,
   };
   addEventListener("keydown", (event) => {
@@ -92,7 +78,7 @@ export function connectControls(cameras) {
     by("playing").setAttribute("d", app.playing ? PAUSE : PLAY);
     by("clock").textContent = `${seconds().toFixed(1)} / ${seconds(app.last).toFixed(1)} s`;
     by("speed").value = String(app.speed);
-    const pressed = { ...app.layers, follow: app.follow, linked: app.linked, webm: app.recording };
+    const pressed = { ...app.layers, follow: app.follow };
     for (const [id, on] of Object.entries(pressed)) by(id).setAttribute("aria-pressed", on);
   });
 }
@@ -113,7 +99,7 @@ export function connectView(camera, cameras, redraw) {
   };
   const move = (factor, about, dx, dy) => {
     if (app.follow && (dx || dy)) set({ follow: false });
-    moveCameras(cameras, camera, factor, about, dx, dy);
+    moveCameras(cameras, factor, about, dx, dy);
     redraw();
   };
   canvas.addEventListener("pointerdown", (event) => {

@@ -69,6 +69,12 @@ export function tracker(ctx, x, y, heading, radius, fill, rim = colours.TRACKER_
   robot(ctx, x, y, heading, radius, fill);
 }
 
+// Where a tracker believes to be.
+export function ghost(ctx, x, y, heading, radius) {
+  pen(ctx, faded(colours.INK, 0.45), 1.2);
+  robot(ctx, x, y, heading, radius, faded(colours.TRACKER, 0.2));
+}
+
 export function target(ctx, x, y, heading, radius) {
   for (const [colour, grow, width] of [[colours.PAPER, 1, 4], [colours.TARGET, -0.4, 2.8]]) {
     pen(ctx, colour, width);

@@ -1,5 +1,5 @@
 // The dialog with all keys and all that is drawn.
-import { EVENTS, broken, colours, disc, faded, leader, line, pen, robot, target, tracker } from "./drawing.js";
+import { EVENTS, broken, colours, disc, faded, ghost, leader, line, pen, robot, target, tracker } from "./drawing.js";
 import { pale } from "./robots.js";
 import { app } from "./state.js";
 import { button, element } from "./text.js";
@@ -9,14 +9,11 @@ const KEYS = [
   ["← →", "one step; with Shift, one second"],
   ["Home, End", "to the start, to the end"],
   ["N, B", "next tick, tick before"],
-  ["[ ]", "slower, faster (0.25× to 8×)"],
   ["0 to 9", "select a tracker; Esc: none"],
   ["F", "follow what is selected"],
-  ["C", "move views together, or one by one"],
   ["R", "show everything again (double click)"],
   ["wheel, drag", "zoom, move; on a touch screen pinch, drag"],
   ["L, S, T", "links, sensing, trails"],
-  ["P, V", "save a picture; record a film"],
 ];
 const NOTE =
   "Score: slots occupied per working tracker, averaged over the steps so far. Safe score: from " +
@@ -39,14 +36,15 @@ const ring = (colour, fill, dashes) => (ctx) => {
   ctx.stroke();
 };
 
-const ghost = (colour, dashes) => (ctx) => {
+const outline = (colour, dashes) => (ctx) => {
   pen(ctx, colour, 1.6, dashes);
   robot(ctx, X, Y, 0, 8);
 };
 
 function samples() {
   const c = colours;
-  const told = app.players.some((player) => player.columns.has("belief/task"));
+  const has = (name) => app.players.some((player) => player.columns.has(name));
+  const [told, drifts] = [has("belief/task"), has("believed_x")];
   return [
     [like(c.TRACKER), told ? "tracker whose policy tells no task" : "tracker, its line ahead"],
     ...(told ? app.world.tasks.map((task, k) => [like(c.TASKS[k]), task]) : []),
@@ -59,12 +57,13 @@ function samples() {
     [(ctx) => target(ctx, X, Y, 0, 7), "target"],
     [ring(c.SLOT), "slot, as wide as the tolerance"],
     [ring(c.SLOT, c.SLOT_FILLED), "slot that is occupied"],
-    [ghost(c.TARGET, [4, 3]), "selected: its last fix of the target, where that is off; paler with age"],
-    [ghost(c.LINK, [1.5, 3]), "selected: where it takes the target to be"],
+    [outline(c.TARGET, [4, 3]), "selected: its last fix of the target, where that is off; paler with age"],
+    [outline(c.LINK, [1.5, 3]), "selected: where it takes the target to be"],
     [ring(c.SENSING_RIM, c.SENSING), "selected: where it would see the target"],
     [dashed(faded(c.INK, 0.6)), "selected: sonar beam that meets something"],
     [dashed(c.LINK), "radio: heard; selected: dashed and dated if it is old"],
     [dashed(faded(c.TARGET, 0.7), [2, 4]), "selected: the slot that it is bound for"],
+    ...(drifts ? [[(ctx) => ghost(ctx, X, Y, 0, 8), "faint: where a tracker believes to be"]] : []),
     ...Object.values(EVENTS).map(({ draw, text }) => [(ctx) => draw(ctx, X, Y), `tick: ${text}`]),
   ];
 }

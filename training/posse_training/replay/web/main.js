@@ -2,10 +2,9 @@
 import { Camera } from "./camera.js";
 import { connectControls, connectView } from "./controls.js";
 import { readReplay } from "./data.js";
-import { connectExport, filmFrame } from "./export.js";
 import { connectPanel } from "./panel.js";
 import { sightOf } from "./sensing.js";
-import { app, listen, readHash, seconds, set, writeHash } from "./state.js";
+import { app, begin, listen, readHash, seconds, set, writeHash } from "./state.js";
 import { fillHeader } from "./text.js";
 import { connectTimeline, drawTimeline, timelineHeight } from "./timeline.js";
 import { drawView } from "./view.js";
@@ -51,7 +50,6 @@ function start() {
     }
     const box = strip.getBoundingClientRect();
     drawTimeline(fill(strip.firstElementChild, box), box.width, box.height, hover);
-    filmFrame();
   };
   const tick = (now) => {
     waiting = false;
@@ -80,7 +78,6 @@ function start() {
   fillHeader();
   connectControls(cameras);
   connectPanel();
-  connectExport(cameras);
   connectTimeline(strip, (at) => {
     hover = at;
     redraw();
@@ -97,6 +94,7 @@ function start() {
   if (narrow.matches) document.body.classList.add("no-panel");
   set({});
   arrange();
+  begin();
   readHash();
   return cameras;
 }

@@ -75,29 +75,19 @@ function values(column, frame, start, size) {
   return Array.from({ length: size }, (_, k) => column.at(frame, start + k));
 }
 
-// An action is in [-1, 1]; beside it, what it asks for.
+// An action is in [-1, 1].
 function actions(robot) {
   const s = app.world.settings;
   const [speed, turn] = robot === s.num_trackers
     ? [s.target_speed, s.target_turn_rate]
     : [s.tracker_speed, s.tracker_turn_rate];
   const action = (player, frame) => values(player.columns.get("action"), frame, 2 * robot, 2);
-  const rows = [
+  return section("action", [
     row("speed", "m/s", (player, frame) => number(((action(player, frame)[0] + 1) / 2) * speed),
       { title: "asked for in this step" }),
     row("turn rate", "rad/s", (player, frame) => number(action(player, frame)[1] * turn),
       { title: "asked for in this step, left positive" }),
-    row("as numbers", "1", (player, frame) => action(player, frame).map((value) => number(value)).join("  ")),
-  ];
-  if (app.players.some((player) => player.columns.has("message"))) {
-    rows.push(row("message", "1", (player, frame) => {
-      const message = player.columns.get("message");
-      if (!message) return null;
-      const [, m] = message.shape;
-      return values(message, frame, m * robot, m).map((value) => number(value, 3)).join(" ");
-    }, { none: "none" }));
-  }
-  return section("action", rows);
+  ]);
 }
 
 function rewards(robot) {

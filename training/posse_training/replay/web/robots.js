@@ -1,5 +1,5 @@
 // The robots of a view: trails, trackers, target, contacts that have just begun.
-import { broken, colours, disc, faded, label, leader, pen, target, tracker, write } from "./drawing.js";
+import { broken, colours, disc, faded, ghost, label, leader, line, pen, target, tracker, write } from "./drawing.js";
 
 const TRAIL_TIME = 6; // s
 const FLASH_TIME = 1; // s
@@ -55,6 +55,17 @@ function colourOf(d, i) {
   const limited = !all || s.num_obstacles > 0 || s.sensor_outages > 0;
   const colour = colours.TASKS[d.player.columns.get("belief/task")?.at(d.frame, i)] ?? colours.TRACKER;
   return limited && !d.at("tracker_sees", i) ? pale(colour) : colour;
+}
+
+// Where poses drift: the pose in which each tracker believes to be, tied to the true one.
+export function ghosts(d) {
+  if (!d.player.columns.has("believed_x")) return;
+  for (let i = 0; i < d.settings.num_trackers; i++) {
+    const [x, y, heading] = ["x", "y", "heading"].map((part) => d.value(`believed_${part}`, i));
+    const place = d.look.project(x, y);
+    ghost(d.ctx, ...place, heading, d.radius);
+    line(d.ctx, ...d.place(i), ...place);
+  }
 }
 
 // Broken ones lie lowest, the selected one on top.

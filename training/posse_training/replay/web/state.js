@@ -2,6 +2,8 @@
 
 export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
 
+const LEAD_IN = 1; // s
+
 export const app = {
   world: null,
   players: [],
@@ -11,9 +13,7 @@ export const app = {
   speed: 1,
   selected: null, // number of a robot; null: none
   layers: { links: true, sensing: true, trails: true },
-  linked: true,
   follow: false,
-  recording: false,
 };
 
 const listeners = [];
@@ -54,6 +54,13 @@ export function play(playing = !app.playing) {
 
 export function seek(position) {
   set({ position: Math.round(position), playing: false });
+}
+
+// A page opens playing, a little before the first event; still, where the user wants no motion or the address says when.
+export function begin() {
+  const steps = app.players.flatMap((player) => player.events.map((event) => event.step)).filter((step) => step > 0);
+  const first = Math.max(0, Math.min(app.last, ...steps) - LEAD_IN / seconds(1));
+  set({ position: steps.length ? first : 0, playing: !matchMedia("(prefers-reduced-motion: reduce)").matches });
 }
 
 // --- the address: #t=12.4&r=3 ---

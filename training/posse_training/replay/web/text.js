@@ -38,12 +38,6 @@ export function words(name) {
   return name.replaceAll("_", " ");
 }
 
-// What was played, in a line.
-export function headline() {
-  const { scenario, version, settings, split, seed, world } = app.world;
-  return `${scenario} v${version} · ${settings.num_trackers} trackers · ${split} seed ${seed} world ${world}`;
-}
-
 export function fillHeader() {
   const { scenario, version, world, seed, split, episode, changed, posse, commit } = app.world;
   const fact = (name, value, title = "", className = "") => {

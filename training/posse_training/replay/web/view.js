@@ -2,13 +2,13 @@
 import { TITLE } from "./camera.js";
 import { colours, label, setFont, write } from "./drawing.js";
 import { floor, grid, obstacles, scaleBar, slots } from "./ground.js";
-import { flashes, quarry, trackers, trails } from "./robots.js";
+import { flashes, ghosts, quarry, trackers, trails } from "./robots.js";
 import { beliefs, links, sight, sonar } from "./sensing.js";
 import { app, frameOf, seconds } from "./state.js";
 
 const LEAST_ROBOT = 7; // px
 const LAYERS = [
-  floor, sight, grid, slots, obstacles, trails, links, sonar, beliefs, trackers, quarry, flashes, scaleBar, title,
+  floor, sight, grid, slots, obstacles, trails, links, sonar, beliefs, ghosts, trackers, quarry, flashes, scaleBar, title,
 ];
 
 // What every layer draws from, and on.
@@ -31,7 +31,7 @@ function drawing(ctx, player, look, position) {
   };
 }
 
-// The player's name and its scores; on a narrow view the words go first, then the safe score.
+// The player's name and its scores; where there is little room, the safe score goes first, then the word.
 function title({ ctx, look, player, frame, position }) {
   ctx.fillStyle = colours.PAPER;
   ctx.fillRect(0, 0, look.width, TITLE);
@@ -39,21 +39,17 @@ function title({ ctx, look, player, frame, position }) {
   ctx.fillRect(0, 0, look.width, 3);
   const middle = TITLE / 2 + 2;
   const { mean, safe } = player.scores[frame];
-  setFont(ctx, 14, 650);
-  const room = look.width - ctx.measureText(player.name).width;
-  const words = [[room < 122 ? "" : "score", mean.toFixed(2)]];
-  if (room >= 204) words.push(["safe", safe.toFixed(2)]);
   let right = look.width - 12;
-  for (const [name, value] of words.reverse()) {
-    for (const [text, weight, colour, gap] of [[value, 600, colours.INK, 6], [name, 400, colours.FAINT_INK, 16]]) {
+  const shown = look.width < 320 ? [[look.width < 220 ? "" : "score", mean]] : [["safe", safe], ["score", mean]];
+  for (const [name, value] of shown) {
+    for (const [text, weight, colour, gap] of [[value.toFixed(2), 600, colours.INK, 6], [name, 400, colours.FAINT_INK, 16]]) {
       write(ctx, text, right, middle, 13, colour, "right", weight);
       right -= ctx.measureText(text).width + gap;
     }
   }
   setFont(ctx, 14, 650);
-  let shown = player.name;
-  while (shown.length > 1 && ctx.measureText(shown).width > right - 16) shown = `${shown.slice(0, -2)}…`;
-  write(ctx, shown, 12, middle, 14, colours.INK, "left", 650);
+  const size = 14 * Math.min(1, (right - 12) / ctx.measureText(player.name).width);
+  write(ctx, player.name, 12, middle, size, colours.INK, "left", 650);
   if (position > player.last) {
     label(ctx, `ended at ${seconds(player.last).toFixed(1)} s`, look.width / 2, TITLE + 14, colours.INK);
   }
