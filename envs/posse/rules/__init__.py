@@ -7,10 +7,13 @@ from posse.rules.kinematics import arc
 from posse.rules.randomness import SENSOR_NOISE, TARGET, between, mix, normal_pair, uniform
 from posse.rules.score import place
 from posse.rules.state import CONFIG, NEVER, SPLITS, TRACKER, beam_directions, config_record, slot_records, world_record
+from posse.rules.targets.smart import DART_TURN, PATIENCE
 
 __all__ = [
     "CONFIG",
+    "DART_TURN",
     "NEVER",
+    "PATIENCE",
     "SENSOR_NOISE",
     "SPLITS",
     "TARGET",
