@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 import pettingzoo
 import pytest
-from pettingzoo.test import max_cycles_test, render_test
+from pettingzoo.test import render_test
 from tests.support.adapters import f32, part
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.pettingzoo_env import TeamParallelEnv
-from posse.adapters.vector_env import TeamVectorEnv
 from posse_baselines import load_target
 
 
@@ -28,12 +26,6 @@ def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
         actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32) for agent in env.agents}
         returned.append(env.step(actions))
     return returned
-
-
-def test_max_cycles_is_the_length_of_an_episode() -> None:
-    max_cycles_test(posse)
-    assert posse.parallel_env(max_cycles=4).scenario.horizon == 4
-    assert posse.parallel_env(horizon=20).scenario.settle_time == pytest.approx(2.0)
 
 
 def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +43,7 @@ def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
     rest = {f"tracker_{i}": f32([-1, 0]) for i in range(5)}
     places = []
     for action in (ahead, circling):
-        env = posse.parallel_env("constant", target="agent")
+        env = posse.parallel_env("constant", target_motion="agent")
         env.reset(seed=1)
         before = env.state_layout.views(env.state())
         start = np.array([before["target_x"], before["target_y"]])
@@ -123,7 +115,7 @@ def test_the_registry_makes_both_kinds() -> None:
     parallel = pettingzoo.make("parallel", "posse/track-v0", scenario="smart", num_trackers=3)
     assert isinstance(parallel, TeamParallelEnv)
     assert len(parallel.possible_agents) == 3
-    assert isinstance(pettingzoo.make("aec", "posse/track-v0", max_cycles=5), pettingzoo.AECEnv)
+    assert isinstance(pettingzoo.make("aec", "posse/track-v0", horizon=5), pettingzoo.AECEnv)
 
 
 def test_turns_move_the_world_when_all_have_acted() -> None:
@@ -150,16 +142,6 @@ def test_turns_check_all_actions_when_the_last_has_acted() -> None:
     with pytest.raises(ValueError, match=r"tracker_0: speed = 2\.0 .*clip_actions=True"):
         env.step(f32([1, 0]))
     assert np.array_equal(env.state(), before)
-
-
-def test_the_target_is_an_agent_by_one_name() -> None:
-    wanted = posse.parallel_env("smart", target="agent").scenario
-    assert posse.batch("smart", target="agent").scenario == posse.get_scenario("smart", target="agent") == wanted
-    for made in (TeamEnv, TeamVectorEnv):
-        with pytest.raises(posse.ScenarioError, match="target"):
-            made("smart", target="agent")
-    with pytest.raises(posse.ScenarioError, match="the one choice is 'agent'"):
-        posse.parallel_env("smart", target="evader")
 
 
 def test_a_policy_moves_the_target_as_in_a_batch() -> None:
