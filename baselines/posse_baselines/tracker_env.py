@@ -148,7 +148,7 @@ def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrid
     if found.target_motion == "agent":
         raise ScenarioError(
             "target_motion='agent' is not possible in posse/Tracker-v0, whose agent is a tracker: "
-            "use posse.parallel_env(..., target='agent')"
+            "use posse.parallel_env(..., target_motion='agent')"
         )
     if found.num_trackers < 2:
         raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")

@@ -5,7 +5,7 @@ from ray.tune import register_env
 import posse
 
 register_env("posse", lambda s: ParallelPettingZooEnv(posse.parallel_env("smart", **s)))
-config = PPOConfig().environment("posse", env_config={"target": "agent"})
+config = PPOConfig().environment("posse", env_config={"target_motion": "agent"})
 config.env_runners(num_env_runners=1)  # processes that play; across a Ray cluster if there is one
 kinds = {"tracker", "target"}  # one policy for all trackers, one for the target
 config.multi_agent(policies=kinds, policy_mapping_fn=lambda agent, _: agent.split("_")[0])

@@ -93,7 +93,7 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
         for _ in range(5):
             observation, *_ = env.step(np.zeros(2, np.float32))
         assert env.observation_space.contains(observation)
-    duel = Safeguard(posse.parallel_env("smart", target="agent"))
+    duel = Safeguard(posse.parallel_env("smart", target_motion="agent"))
     duel.reset(seed=1)
     actions = {agent: np.zeros(2, np.float32) for agent in duel.agents}
     actions["target_0"] = np.ones(2, np.float32)

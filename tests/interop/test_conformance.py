@@ -29,7 +29,7 @@ VARIANTS: dict[str, Settings] = {
     "discrete actions, a rectangle": {"scenario": "obstacles", "discrete_actions": True, "arena": (26.0, 16.0)},
     "one tracker": {"scenario": "constant", "num_trackers": 1},
     "messages": {"scenario": "field", "message_size": 2},
-    "the target an agent": {"scenario": "smart", "target": "agent"},
+    "the target an agent": {"scenario": "smart", "target_motion": "agent"},
 }
 KEYS = {"score", *(f"reward/{t.name}" for t in posse.REWARD_TERMS), *(f"metrics/{m.name}" for m in posse.METRICS)}
 PLAIN = "black_death_v3 clip_reward_v0 flatten_v0 nan_random_v0 nan_zeros_v0 normalize_obs_v0 pad_observations_v0"

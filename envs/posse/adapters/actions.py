@@ -21,8 +21,6 @@ from posse.scenarios import Scenario, ScenarioError
 MOTIONS: Final = np.array(list(itertools.product((-1, 0, 1), (-1, -0.5, 0, 0.5, 1))), np.float32)
 """The discrete actions, (15, 2): number 5 i + j is speed i (rest, half, full) with turn rate j (right to left)."""
 
-_FLOAT32: Final = np.dtype(np.float32)
-
 
 def agent_names(scenario: Scenario) -> list[str]:
     """Return the agents' names in the order of their rows, ``tracker_0`` ..., ``target_0`` last."""
@@ -56,13 +54,9 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
 
 def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discrete: bool) -> FloatArray:
     """Return an action of a shape as numbers, (..., 2 + m) float32, whose range is not checked; or ValueError."""
-    if type(action) is np.ndarray and action.dtype is _FLOAT32 and action.shape == shape and not discrete:
-        return np.ascontiguousarray(action)  # the usual case, which the checks below would take as long as the rest
-    array = real_numbers(name, action, "iu" if discrete else "fiu")
-    if array.shape != shape:
-        raise ValueError(f"{name} has shape {array.shape}, wanted {shape}")
     if not discrete:
-        return as_float32(array)
+        return as_float32(name, action, shape)
+    array = real_numbers(name, action, shape, "iu")
     outside = (array < 0) | (array >= len(MOTIONS))
     if outside.any():
         where = f"[{', '.join(map(str, np.argwhere(outside)[0]))}]" if array.ndim else ""

@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
-from posse.engine.opponent import TargetPolicy, batch_with
+from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray, OwnArrays
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
@@ -78,10 +78,10 @@ class BatchEnv:
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.batch = batch_with(
+        self.batch = batch(
             self._fit(scenario, **overrides),
             num_worlds,
-            target_policy,
+            target_policy=target_policy,
             seed=0 if seed is None else seed,
             split=split,
             first_world=first_world,

@@ -19,7 +19,7 @@ def team_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     if found.target_motion == "agent":
         raise ScenarioError(
             "target_motion='agent' is not possible in an environment of one agent: use posse.parallel_env(..., "
-            "target='agent'), a scripted target_motion, or target_policy="
+            "target_motion='agent'), a scripted target_motion, or target_policy="
         )
     return found
 

@@ -15,7 +15,7 @@ from posse.adapters.actions import agent_names, as_motions, box, single_action_s
 from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario
 
 _AgentInfos = dict[str, dict[str, Any]]
 
@@ -51,8 +51,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     Args:
         scenario: Name of a scenario, or a scenario.
-        max_cycles: PettingZoo's name for ``horizon``.
-        settings: ``target="agent"`` makes the target an agent; further arguments of
+        settings: ``target_motion="agent"`` makes the target an agent; further arguments of
             :class:`posse.adapters.base.BatchEnv`, or any field of :class:`posse.Scenario`.
 
     Raises:
@@ -61,13 +60,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     metadata: ClassVar[dict[str, Any]] = {**WorldEnv.metadata, "name": "posse_track_v0", "is_parallelizable": True}
 
-    def __init__(
-        self, scenario: str | Scenario = "constant", *, max_cycles: int | None = None, **settings: Any
-    ) -> None:
-        if max_cycles is not None:
-            if "horizon" in settings:
-                raise ScenarioError("max_cycles and horizon mean the same: give one of them")
-            settings["horizon"] = max_cycles
+    def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
         super().__init__(scenario, **settings)
         self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
         self.agents: list[str] = []

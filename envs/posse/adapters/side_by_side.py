@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,8 +11,9 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
+from posse.engine.arguments import real_numbers
 from posse.scenarios import Family, Scenario, ScenarioError
-from posse.scenarios.family import scenario_or_family
+from posse.scenarios.family import scenario_or_family, shares
 
 DRAWN = 16
 """Drawn scenarios of a family that are played side by side, where there are as many worlds."""
@@ -50,9 +50,7 @@ class FamilyVectorEnv(VectorEnv[Any, Any, Any]):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Advance every world by one control step."""
-        whole = np.asarray(actions)
-        if whole.shape != self.action_space.shape:
-            raise ValueError(f"actions have shape {whole.shape}, wanted {self.action_space.shape}")
+        whole = real_numbers("the array of actions", actions, self.action_space.shape)
         found = [part.step(whole[one]) for one, part in self._each()]
         *arrays, infos = zip(*found, strict=True)
         observations, rewards, terminated, truncated = (np.concatenate(each) for each in arrays)
@@ -101,14 +99,8 @@ def _vector(
         return kind(scenario, num_envs, **settings)  # type: ignore[arg-type]
     kind(given.base, num_envs, **settings).close()  # raises what is invalid
     seed, split, first = settings.get("seed"), settings.get("split", "train"), settings.pop("first_world", 0)
-    count = min(DRAWN, num_envs)
-    ends = [num_envs * k // count for k in range(count + 1)]
-    return FamilyVectorEnv(
-        [
-            kind(given.draw(k, seed or 0, split), end - start, first_world=first + start, **settings)
-            for k, (start, end) in enumerate(itertools.pairwise(ends))
-        ]
-    )
+    parts = shares(given, num_envs, min(DRAWN, num_envs), seed or 0, split)
+    return FamilyVectorEnv([kind(one, len(part), first_world=first + part.start, **settings) for one, part in parts])
 
 
 def _union(parts: Sequence[spaces.Space[Any]]) -> spaces.Box:

@@ -84,7 +84,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ResetNeeded: Before the first reset, or after an end with autoreset ``"disabled"``.
             ValueError: Actions out of their space; nothing is changed.
         """
-        motions = as_motions("actions", actions, self.action_space.shape, self._discrete)
+        motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
         observations, rewards, terminated, truncated, found = self.batch.step(self._of_team(motions))
         self._show()
         ended, last = terminated | truncated, found.pop("final_obs", None)

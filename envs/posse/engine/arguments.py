@@ -39,8 +39,10 @@ def options_of(options: object) -> dict[str, Any]:
     return dict(options or {})
 
 
-def real_numbers(name: str, value: object, kinds: str = "fiu") -> npt.NDArray[Any]:
-    """Return a value as an array of real numbers, or of whole ones (``kinds="iu"``), or raise ValueError."""
+def real_numbers(
+    name: str, value: object, shape: tuple[int, ...] | None = None, kinds: str = "fiu"
+) -> npt.NDArray[Any]:
+    """Return a value as an array of a shape, of real numbers or whole ones (``kinds="iu"``), or raise ValueError."""
     try:
         array = np.asarray(value)
     except Exception:  # numpy's ValueError, or any error of a foreign object's conversion
@@ -48,15 +50,18 @@ def real_numbers(name: str, value: object, kinds: str = "fiu") -> npt.NDArray[An
     if array.dtype.kind not in kinds:
         wanted = "real numbers" if "f" in kinds else "whole numbers"
         raise ValueError(f"{name} must be {wanted}, got {reprlib.repr(value)} ({array.dtype})")
+    if shape is not None and array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}, wanted {shape}")
     return array
 
 
-def as_float32(array: npt.NDArray[Any]) -> FloatArray:
-    """Return real numbers as contiguous float32; numbers out of its range become infinite."""
-    if array.dtype == _FLOAT32:
-        return np.ascontiguousarray(array)
+def as_float32(name: str, value: object, shape: tuple[int, ...] | None = None) -> FloatArray:
+    """Return :func:`real_numbers` as contiguous float32; numbers out of its range become infinite."""
+    if type(value) is np.ndarray and value.dtype is _FLOAT32 and value.shape == shape:
+        return np.ascontiguousarray(value)  # the usual case, which the checks would take as long as the rest
+    array = real_numbers(name, value, shape)
     with np.errstate(over="ignore"):
-        return array.astype(np.float32, order="C")
+        return np.ascontiguousarray(array, np.float32)
 
 
 def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions[{}, {}, {}]".format) -> FloatArray:

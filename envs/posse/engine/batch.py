@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of, real_numbers
+from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of
 from posse.engine.infos import Infos
 from posse.engine.kernels import (
     LOOK,
@@ -130,7 +130,7 @@ class Batch:
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = declarations_for(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
-        self._tables = tables_of(self.scenario)
+        self._tables = tables_of(self.scenario, self._declared.reward_terms)
         self._dispatcher: Callable[..., int] = kernel_of(self._declared)
         self._kernel: Callable[..., int] = direct(self._dispatcher)
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
@@ -420,12 +420,7 @@ class Batch:
 
     def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
-        array = real_numbers("actions", actions)
-        if array.shape != self.action_shape:
-            raise ValueError(
-                f"actions have shape {array.shape}, wanted {self.action_shape}: (worlds, agents, 2 + message_size)"
-            )
-        return in_box(as_float32(array), self.clip_actions)
+        return in_box(as_float32("the array of actions", actions, self.action_shape), self.clip_actions)
 
     def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
         """Advance every world by valid actions, or execute its order; return how many episodes are over.

@@ -10,12 +10,13 @@ are observed together.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import RewardTerm
 from posse.numeric import ONE, UNCOMPILED, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
@@ -30,7 +31,6 @@ from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
-from posse.signals.reward import weights_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
 from posse.signals.views import OBSERVING
@@ -198,15 +198,11 @@ def advance_worlds(
     return over
 
 
-def tables_of(scenario: Scenario) -> Tables:
-    """Return the tables of a scenario."""
-    return Tables(
-        config_record(scenario),
-        slot_records(scenario),
-        beam_directions(scenario),
-        weights_for(scenario, dict(scenario.reward_weights)),
-        weights_for(scenario, dict(scenario.target_reward_weights)),
-    )
+def tables_of(scenario: Scenario, terms: Iterable[RewardTerm]) -> Tables:
+    """Return the tables of a scenario with these reward terms; those that it does not weight count 0."""
+    given = dict(scenario.reward_weights), dict(scenario.target_reward_weights)
+    weights = [np.array([each.get(term.name, 0.0) for term in terms], np.float32) for each in given]
+    return Tables(config_record(scenario), slot_records(scenario), beam_directions(scenario), *weights)
 
 
 def kernel_of(declarations: Declarations) -> Callable[..., int]:

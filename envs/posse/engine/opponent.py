@@ -9,11 +9,12 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.arguments import as_float32, in_box, real_numbers
+from posse.engine.arguments import as_float32, in_box
 from posse.engine.batch import Batch
 from posse.engine.kernels import LOOK, Results
 from posse.numeric import BoolArray, FloatArray
-from posse.scenarios import Scenario
+from posse.scenarios import Family, Scenario, get_scenario
+from posse.scenarios.family import scenario_or_family, shares
 from posse.signals.layout import ObservationLayout
 
 
@@ -112,10 +113,10 @@ class PairedBatch(Batch):
         """Return the actions of all robots, and the memory of the policy inside."""
         who = "target's" if self.moves_target else "team's"
         chosen, memory = self.inside.act(self._seen, self.memory)
-        array, wanted = real_numbers(f"what the {who} policy returned", chosen), self._their_shape
+        array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
-        theirs = as_float32(array[:, :, : wanted[2]])
+        theirs = np.ascontiguousarray(array[:, :, : wanted[2]])
         whole = np.zeros(self._all_actions, np.float32)
         whole[:, self._mine, : mine.shape[2]] = mine
         whole[:, self._theirs, : wanted[2]] = in_box(
@@ -124,28 +125,70 @@ class PairedBatch(Batch):
         return whole, memory
 
 
-def batch_with(
-    scenario: Scenario,
-    num_worlds: int,
+def batch(
+    scenario: str | Scenario = "constant",
+    num_worlds: int = 1,
+    *,
+    seed: int = 0,
+    split: str = "train",
+    first_world: int = 0,
+    autoreset: str = "next_step",
+    num_threads: int | None = None,
+    clip_actions: bool = False,
     target_policy: TargetPolicy | None = None,
     team_policy: TargetPolicy | None = None,
-    **settings: Any,
+    **overrides: Any,
 ) -> Batch:
-    """Return a batch, one side of which is moved by a policy if there is one.
+    """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
+
+    With ``target_policy`` that policy moves the target of every world; observations, actions and
+    rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
+    are those of the target, one row and actions of two numbers. Both return a :class:`PairedBatch`.
 
     Raises:
         TypeError: ``target_policy`` or ``team_policy`` lacks a method.
         ValueError: Both are given, or as :class:`Batch`.
     """
+    settings: dict[str, Any] = {
+        "seed": seed,
+        "split": split,
+        "first_world": first_world,
+        "autoreset": autoreset,
+        "num_threads": num_threads,
+        "clip_actions": clip_actions,
+    }
+    found = get_scenario(scenario, **overrides)
     if target_policy is not None and team_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
     inside, side = (team_policy, "team") if target_policy is None else (target_policy, "target")
     if inside is None:
-        return Batch(scenario, num_worlds, **settings)
+        return Batch(found, num_worlds, **settings)
     missing = [name for name in ("begin", "act", "restart") if not hasattr(inside, name)]
     if missing:
         raise TypeError(
             f"{side}_policy={reprlib.repr(inside)} is not the policy of a {side}: it has no "
             f"{', '.join(missing)} (posse.TargetPolicy)"
         )
-    return PairedBatch(scenario, num_worlds, inside, moves_target=side == "target", **settings)
+    return PairedBatch(found, num_worlds, inside, moves_target=side == "target", **settings)
+
+
+def batches(
+    scenario: str | Scenario | Family,
+    num_worlds: int,
+    *,
+    scenarios: int = 16,
+    seed: int = 0,
+    split: str = "train",
+    first_world: int = 0,
+    **settings: Any,
+) -> list[Batch]:
+    """Return batches that hold so many worlds together: of a family one for each of ``scenarios`` drawn scenarios.
+
+    A world depends on seed, split and its number alone; so does scenario k on seed, split and k. The other settings
+    are those of :func:`batch`.
+    """
+    parts = shares(scenario_or_family(scenario), num_worlds, scenarios, seed, split)
+    return [
+        batch(one, len(part), seed=seed, split=split, first_world=first_world + part.start, **settings)
+        for one, part in parts
+    ]

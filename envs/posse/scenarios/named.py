@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import reprlib
 from typing import Any, Final
 
 from posse.registry import unknown
@@ -156,7 +155,7 @@ def _named(name: str) -> Scenario:
     return Scenario(name=name, **SCENARIOS[name])
 
 
-def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: Any) -> Scenario:
+def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
 
     A ``horizon`` that is given without ``settle_time``, and makes the episode shorter than that of
@@ -164,7 +163,6 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
 
     Args:
         scenario: Its name, or a scenario.
-        target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -177,11 +175,6 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
         found = _named(scenario)
     else:
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
-    if target is not None and (target != "agent" or overrides.setdefault("target_motion", "agent") != "agent"):
-        given = f"target={reprlib.repr(target)}"
-        raise ScenarioError(
-            f"{given} is refused: the one choice is 'agent', without target_motion=, which names others"
-        )
     if "horizon" in overrides and "settle_time" not in overrides:
         at_once = found.replace(settle_time=_SHORTEST, **overrides)
         return at_once.replace(settle_time=min(found.settle_time, at_once.duration))

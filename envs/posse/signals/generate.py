@@ -13,9 +13,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 import posse.signals.metrics
-import posse.signals.own_fields  # noqa: F401  (declare the built-in metrics and fields)
+import posse.signals.own_fields
+import posse.signals.reward  # noqa: F401  (declare the built-in metrics, fields and terms)
 from posse.declarations import (
     METRICS,
+    REWARD_TERMS,
     SENSORS,
     TARGET_MOTIONS,
     FieldDeclaration,
@@ -28,7 +30,6 @@ from posse.declarations import (
 from posse.numeric import WIDTH
 from posse.registry import Declaration, Function, parameters_of, place_of
 from posse.scenarios import Scenario
-from posse.signals.reward import terms_for
 
 
 class Declarations(NamedTuple):
@@ -59,7 +60,7 @@ def declarations_for(scenario: Scenario) -> Declarations:
         TARGET_MOTIONS.with_added(scenario.target_motion),
         SENSORS.with_added(scenario.sensor),
         METRICS.with_added(*scenario.metrics),
-        terms_for(scenario),
+        REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
     )
 
 

@@ -6,13 +6,12 @@ and reported in every scenario, others in scenarios that give them a weight.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from posse.declarations import REWARD_TERMS, RewardTerm, reward_term
+from posse.declarations import RewardTerm, reward_term
 from posse.numeric import ONE, ZERO, FloatArray, Record
-from posse.scenarios import Scenario
 
 
 @reward_term("1")
@@ -65,16 +64,6 @@ def effort(c: Record, w: Record, t: Record) -> np.float32:
 def team(c: Record, w: Record) -> np.float32:
     """The team's score of this step: occupied slots per working tracker, at most 1."""
     return np.float32(w.score)
-
-
-def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
-    """Return the terms of a scenario: the built-in ones, then others with a weight."""
-    return REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
-
-
-def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
-    """Return weights in the order of a scenario's terms, (K,) float32; those not given are 0."""
-    return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
 
 
 def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatArray) -> None:

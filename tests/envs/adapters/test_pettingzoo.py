@@ -5,18 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pettingzoo
 import pytest
-from pettingzoo.test import max_cycles_test, render_test
+from pettingzoo.test import render_test
 from tests.support.adapters import f32, part
 
 import posse
 from posse.adapters.actions import MOTIONS
 from posse.adapters.pettingzoo_env import TeamParallelEnv
-
-
-def test_max_cycles_is_the_length_of_an_episode() -> None:
-    max_cycles_test(posse)
-    assert posse.parallel_env(max_cycles=4).scenario.horizon == 4
-    assert posse.parallel_env(horizon=20).scenario.settle_time == pytest.approx(2.0)
 
 
 def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,7 +63,7 @@ def test_the_registry_makes_both_kinds() -> None:
     parallel = pettingzoo.make("parallel", "posse/track-v0", scenario="smart", num_trackers=3)
     assert isinstance(parallel, TeamParallelEnv)
     assert len(parallel.possible_agents) == 3
-    assert isinstance(pettingzoo.make("aec", "posse/track-v0", max_cycles=5), pettingzoo.AECEnv)
+    assert isinstance(pettingzoo.make("aec", "posse/track-v0", horizon=5), pettingzoo.AECEnv)
 
 
 def test_turns_move_the_world_when_all_have_acted() -> None:

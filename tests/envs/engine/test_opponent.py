@@ -38,7 +38,7 @@ def actions_of(step: int, shape: tuple[int, ...] = (WORLDS, 2, 2)) -> Any:
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_it_plays_as_a_batch_whose_target_is_driven_from_outside(autoreset: str) -> None:
     inside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target_policy=Weaver())
-    outside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target="agent")
+    outside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target_motion="agent")
     mine, theirs = inside.reset(), outside.reset()
     assert mine.shape == inside.observation_shape == (WORLDS, 2, inside.layout.size)
     weaver, age = Weaver(), np.zeros(WORLDS)
@@ -154,7 +154,7 @@ def test_what_is_no_target_policy_is_refused() -> None:
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
     with pytest.raises(posse.ScenarioError, match="target_policy="):
-        gym.make("posse/Team-v0", scenario=SHORT, target="agent")
+        gym.make("posse/Team-v0", scenario=SHORT, target_motion="agent")
 
 
 def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
@@ -190,7 +190,7 @@ class Crossing(Weaver):
 def test_trackers_inside_play_as_ones_driven_from_outside() -> None:
     speaking = SHORT.replace(message_size=1)
     inside = posse.batch(speaking, WORLDS, autoreset="disabled", team_policy=Crossing())
-    outside = posse.batch(speaking, WORLDS, autoreset="disabled", target="agent")
+    outside = posse.batch(speaking, WORLDS, autoreset="disabled", target_motion="agent")
     mine, theirs = inside.reset(), outside.reset()
     crossing, age = Crossing(), np.zeros(WORLDS)
     assert inside.action_shape == (WORLDS, 1, 2)
