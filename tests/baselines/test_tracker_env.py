@@ -14,6 +14,7 @@ from tests.support.adapters import out_of_band, same
 
 import posse
 from posse_baselines import PolicyError, begin, load
+from posse_baselines.playing import poses_of
 from posse_baselines.tracker_env import TrackerEnv
 
 NAME, E = "posse/Tracker-v0", 3
@@ -57,10 +58,10 @@ def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
 def test_the_learners_action_moves_its_tracker_and_no_other() -> None:
     env = TrackerEnv("constant", number=1, teammates="idle", seed=3, **SHORT)
     env.reset()
-    before = env.layout.views(env.batch.observe())["position"].copy()
+    before = poses_of(env.batch.state, "tracker")
     for _ in range(10):
         env.step(np.array([1.0, 0.0], np.float32))
-    moved = np.linalg.norm(env.layout.views(env.batch.observe())["position"] - before, axis=-1)[0]
+    moved = np.linalg.norm((poses_of(env.batch.state, "tracker") - before)[..., :2], axis=-1)[0]
     assert moved == pytest.approx([0, 1, 0, 0, 0], abs=1e-4)
 
 
@@ -70,7 +71,8 @@ def test_a_silent_learner_says_zeros() -> None:
     env.reset()
     for _ in range(5):
         env.step(np.zeros(2, np.float32))
-    views = env.layout.views(env.batch.observe()[0, 1])
+    assert isinstance(env.batch, posse.PairedBatch)
+    views = env.layout.views(env.batch.everyone[1].observations[0, 1])
     np.testing.assert_array_equal(views["neighbour_message"][views["neighbour_number"] == 0], 0)
 
 
