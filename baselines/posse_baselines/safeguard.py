@@ -22,6 +22,7 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
+from posse_baselines.ddcs.actuation import surround
 from posse_baselines.ddcs.memory import (
     MATE,
     MATE_AT_START,
@@ -35,7 +36,6 @@ from posse_baselines.ddcs.memory import (
     work_for,
 )
 from posse_baselines.ddcs.monitoring import update_mates, watch_target
-from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.guidance import regulate, write_motion
 from posse_baselines.laws.offsets import in_units

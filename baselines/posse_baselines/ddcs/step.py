@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.detour import detour
-from posse_baselines.ddcs.foresight import foresee, make_up, surround_ahead
+from posse_baselines.ddcs.actuation import detour, foresee, make_up, surround_ahead
 from posse_baselines.ddcs.memory import Team, Work, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import move, next_task, want

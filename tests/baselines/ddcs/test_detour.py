@@ -9,7 +9,7 @@ import pytest
 
 import posse
 from posse_baselines import DDCS, play
-from posse_baselines.ddcs.detour import turn_past
+from posse_baselines.ddcs.actuation import turn_past
 from posse_baselines.laws.safeguard import DISC, put_disc
 
 CLEARANCE = 0.2
