@@ -194,8 +194,8 @@ def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None
     [
         ("a\nb=idle", "printable characters"),
         ("x" * 400 + "=idle", r"400 characters\) must have at most 100"),
-        ("x" * 5000, "unknown policy 'x+.*policies are: random"),
-        ("", "unknown policy ''; policies are: random"),
+        ("x" * 5000, "unknown policy 'x+.*known: random"),
+        ("", "unknown policy ''; known: random"),
     ],
 )
 def test_labels_that_no_report_can_show(text: str, message: str) -> None:
