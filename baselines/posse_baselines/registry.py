@@ -5,22 +5,22 @@ A target is a scripted motion of the scenario, or a policy that moves it: learne
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
+from posse.registry import unknown
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.policies.scripted import ABLATIONS, SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
-from posse_baselines.tuned import from_file
+from posse_baselines.tuned import read_tuned
 
-_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": from_file}
+_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": read_tuned}
 """Readers of policy files, by suffix."""
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
@@ -98,25 +98,15 @@ def load(policy: str | Path) -> Policy:
     text = str(policy)
     if text in SCRIPTED:
         return SCRIPTED[text]()
-    path = shipped().get(text, Path(text))
-    if path.suffix in _FILES or is_file(path):
-        if path.suffix not in _FILES:
-            raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(_FILES)}")
-        found = _FILES[path.suffix](path)
-        if getattr(found, "side", "trackers") == "target":
-            raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
-        return found
-    if ":" in text:
-        made = _from_module(text)
-        if not isinstance(made, Policy):
-            raise PolicyError(
-                f"{text!r:.120} is not a policy: it must have name, message_size, reads_state, begin, "
-                "act, restart and annotations, as posse_baselines.Policy says"
-            )
-        return made
-    if is_file(path / "best.safetensors"):
-        raise PolicyError(f"{text!r} is a run folder: its policy is {path / 'best.safetensors'}")
-    raise _unknown("policy", "policies", text, [name for name in policy_names() if name not in ABLATIONS])
+    found = _found("policy", text, shipped(), _FILES, [name for name in policy_names() if name not in ABLATIONS])
+    if getattr(found, "side", "trackers") == "target":
+        raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
+    if not isinstance(found, Policy):
+        raise PolicyError(
+            f"{text!r:.120} is not a policy: it must have name, message_size, reads_state, begin, "
+            "act, restart and annotations, as posse_baselines.Policy says"
+        )
+    return found
 
 
 def load_target(target: str | Path | Target) -> Target:
@@ -137,22 +127,36 @@ def load_target(target: str | Path | Target) -> Target:
         return Target(text, text)
     if text in OPEN_LOOP:
         return Target(text, AGENT, OPEN_LOOP[text])
-    path = shipped_targets().get(text, Path(text))
-    if path.suffix == ".safetensors" or is_file(path):
-        policy = LearnedPolicy.from_file(path)
-        if policy.side != "target":
-            raise PolicyError(f"{path} is the policy of a team, {policy.name!r}, not of a target")
-        return Target(policy.name, AGENT, policy)
+    readers = {".safetensors": LearnedPolicy.from_file}
+    found = _found("target", text, shipped_targets(), readers, target_names())
+    if getattr(found, "side", "target") != "target":
+        raise PolicyError(f"{text!r} is the policy of a team, {found.name!r}, not of a target")
+    missing = [name for name in ("begin", "act", "restart") if not callable(getattr(found, name, None))]
+    if missing:
+        raise PolicyError(
+            f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, as posse.TargetPolicy says"
+        )
+    return Target(getattr(found, "name", text), AGENT, found)
+
+
+def _found(
+    kind: str,
+    text: str,
+    shipped: Mapping[str, Path],
+    readers: Mapping[str, Callable[[Path], Any]],
+    names: Iterable[str],
+) -> Any:
+    """Return what a shipped name, a file or ``"package.module:Class"`` stands for."""
+    path = shipped.get(text, Path(text))
+    if path.suffix in readers or is_file(path):
+        if path.suffix not in readers:
+            raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(readers)}")
+        return readers[path.suffix](path)
     if ":" in text:
-        made = _from_module(text)
-        missing = [name for name in ("begin", "act", "restart") if not callable(getattr(made, name, None))]
-        if missing:
-            raise PolicyError(
-                f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, "
-                "as posse.TargetPolicy says"
-            )
-        return Target(getattr(made, "name", text), AGENT, made)
-    raise _unknown("target", "targets", text, target_names())
+        return _from_module(text)
+    if is_file(path / "best.safetensors"):
+        raise PolicyError(f"{text!r} is a run folder: its policy is {path / 'best.safetensors'}")
+    raise PolicyError(f'{unknown(kind, text, names)}, a file, or "package.module:Class"')
 
 
 def ships_or_is_file(policy: Any) -> bool:
@@ -185,21 +189,9 @@ def _from_module(text: str) -> Any:
         raise PolicyError(f"cannot import {module_name!r:.120}: {why}") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
-        raise PolicyError(f"module {module_name!r} has no {attribute!r}{_similar(attribute, names)}")
+        raise PolicyError(f"in module {module_name!r}: {unknown('name', attribute, names)}")
     found: Any = getattr(module, attribute)
     try:
         return found() if isinstance(found, type) else found
     except Exception as error:  # whatever the class raises
         raise PolicyError(f"{text!r} cannot be created without arguments: {type(error).__name__}: {error}") from error
-
-
-def _unknown(kind: str, kinds: str, text: str, names: Iterable[str]) -> PolicyError:
-    return PolicyError(
-        f"unknown {kind} {text!r:.120}{_similar(text[:100], names)}; {kinds} are: "
-        f'{", ".join(names)}, a file, or "package.module:Class"'
-    )
-
-
-def _similar(text: str, names: Iterable[str]) -> str:
-    near = difflib.get_close_matches(text, names, n=3, cutoff=0.5)
-    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""

@@ -21,25 +21,10 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
-from posse_baselines.ddcs.memory import (
-    MATE,
-    MATE_AT_START,
-    MIND,
-    MIND_AT_START,
-    Minds,
-    Team,
-    Work,
-    read_body,
-    team_of,
-    work_for,
-)
-from posse_baselines.ddcs.monitoring import update_mates, watch_target
-from posse_baselines.ddcs.surroundings import surround
-from posse_baselines.laws.geometry import length, scaled
-from posse_baselines.laws.guidance import regulate, write_motion
+from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse_baselines.ddcs.memory import minds_for
+from posse_baselines.ddcs.step import guard_all
 from posse_baselines.laws.offsets import in_units
-from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.policy import PolicyError
 from posse_baselines.tuned import TunedDDCS
 
@@ -55,16 +40,10 @@ class Guard(OwnArrays):
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         self._layout, scenario = layout, layout.scenario
-        n = scenario.num_trackers
-        robots = n if robots is None else robots
-        self._minds = Minds(
-            team_of(layout, TunedDDCS("ddcs-tuned").settings_for(scenario)),
-            np.empty((num_worlds, robots), MIND),
-            np.empty((num_worlds, robots, n), MATE),
-            np.empty((num_worlds, robots, 0), np.uint16),
-        )
+        robots = scenario.num_trackers if robots is None else robots
+        settings = TunedDDCS("ddcs-tuned").settings_for(scenario)
+        self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
-        self.restart(np.ones(num_worlds, np.bool_))
 
     def follow(self, observations: FloatArray) -> None:
         """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
@@ -72,7 +51,7 @@ class Guard(OwnArrays):
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
-        self._minds.me[mask], self._minds.mates[mask] = MIND_AT_START, MATE_AT_START
+        self._minds.restart(mask)
 
     def actions(self, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
@@ -85,35 +64,12 @@ class Guard(OwnArrays):
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")
-        work = work_for(self._minds.mates.shape[2])
-        over_worlds(_guard_all, (self._minds, work, self._observed, actions), *self._minds.me.shape)
+        self._minds.run(guard_all, self._observed, actions)
         return actions
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return what it remembers as arrays (E, ...) by name; views, not copies."""
         return {"observed": self._observed, **self._minds.arrays()}
-
-
-@kernel
-def _guard_all(
-    minds: Minds, work: Work, observations: FloatArray, actions: FloatArray, thread: int, first: int, end: int
-) -> None:
-    """Write the motions of a share of the worlds, in the place of the wanted velocities."""
-    shared = minds.team
-    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-    discs, plays = work.discs[thread], work.plays[thread]
-    for e in range(first, end):
-        for i in range(observations.shape[1]):
-            me, mates, row, action = minds.me[e, i], minds.mates[e, i], observations[e, i], actions[e, i]
-            read_body(team, me, row)
-            watch_target(team, me, row)
-            update_mates(team, me, mates, row)
-            wanted = complex(float(action[0]), float(action[1]))
-            wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
-            velocity, _ = safe_velocity(me, discs[: surround(team, me, mates, row, discs)], wanted, plays)
-            speed, omega = regulate(me, velocity, 0.0)
-            write_motion(action, speed, omega, me.max_speed, me.max_omega)
-            me.step += 1
 
 
 def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)

@@ -6,45 +6,29 @@ import functools
 from typing import Any
 
 import gymnasium
-import numpy as np
-import numpy.typing as npt
-from gymnasium.vector import AutoresetMode
 
-from posse import Batch, Scenario, ScenarioError, get_scenario
+from posse import Batch, PairedBatch, Scenario, ScenarioError, get_scenario
 from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.vector_env import TeamVectorEnv
-from posse.numeric import BoolArray, FloatArray
-from posse_baselines.policy import Policy, begin
+from posse_baselines.policy import Policy
 from posse_baselines.registry import load
 
 
 class _WithTeammates:
     """The team-mates of one tracker in every world of a batch."""
 
-    batch: Batch
-    _rows: Any
+    _rows: int | slice = 0
     _fit: Any
 
     def _join(self, number: int, teammates: str | Policy, silent: bool) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
-        self.number = self._rows = number
-        self._silent = silent
+        self.number, self._silent = number, silent
         self._fit = functools.partial(_fitting, self.teammates, number)
-        self._memory: Any = None
-        # (E, N, F) what the team observes; never written to, since policies may keep observations.
-        self._team: FloatArray = np.zeros(0, np.float32)
 
-    def _of_team(self, own: FloatArray) -> FloatArray:
-        """Return the teams' actions (E, N, 2 + m), given those of one tracker (E, 2 or 2 + m)."""
-        self.batch.check_running()
-        team = np.zeros(self.batch.action_shape, np.float32)
-        team[:, self.number, : own.shape[1]] = own
-        own = self.batch.check_actions(team)[:, self.number]  # refused before the team-mates' memory changes
-        actions, memory = self.teammates.act(self._team, self._memory)
-        team = self.batch.check_actions(actions).copy()
-        team[:, self.number] = own
-        self._memory = memory
-        return team
+    def _make(self, scenario: Scenario, num_worlds: int, target_policy: Any, **settings: Any) -> Batch:
+        if target_policy is not None:
+            raise TypeError("target_policy= is not possible in posse/Tracker-v0: a policy moves the team-mates already")
+        return PairedBatch(scenario, num_worlds, self.teammates, outside=self.number, silent=self._silent, **settings)
 
 
 class TrackerEnv(_WithTeammates, TeamEnv):
@@ -84,19 +68,6 @@ class TrackerEnv(_WithTeammates, TeamEnv):
         self._join(number, teammates, silent)
         super().__init__(scenario, **settings)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode; see :class:`posse.adapters.gymnasium_env.TeamEnv`."""
-        result = super().reset(seed=seed, options=options)
-        self._team = self.batch.observe()
-        self._memory = begin(self.teammates, self.batch)
-        return result
-
-    def _advance(self, actions: FloatArray) -> None:
-        super()._advance(self._of_team(actions[:, 0]))
-        self._team = self._results.observations.copy()
-
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
     """:class:`TrackerEnv` in E worlds, stepped together; arguments as there and for :class:`TeamVectorEnv`."""
@@ -113,33 +84,6 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
     ) -> None:
         self._join(number, teammates, silent)
         super().__init__(scenario, num_envs, **settings)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start episodes; see :meth:`TeamVectorEnv.reset`."""
-        result = super().reset(seed=seed, options=options)
-        mask = (options or {}).get("reset_mask")
-        if mask is None or self._memory is None:
-            self._memory = begin(self.teammates, self.batch)
-        else:
-            self._memory = self.teammates.restart(self._memory, np.array(mask, np.bool_))
-        return result
-
-    def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
-        """Advance every world by one control step; see :meth:`TeamVectorEnv.step`."""
-        result = super().step(actions)
-        if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            begins = result[2] | result[3]
-        else:
-            begins = self.batch.worlds["step"] == 0
-        if begins.any():
-            self._memory = self.teammates.restart(self._memory, begins)
-        return result
-
-    def _observed(self, observations: FloatArray) -> FloatArray:
-        self._team = observations
-        return super()._observed(observations)
 
 
 def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:

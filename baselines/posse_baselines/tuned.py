@@ -6,7 +6,6 @@ Their files are JSON, checked when read; they never run code.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -49,37 +48,21 @@ class TunedDDCS(DDCS):
         return self.settings if path is None else read_tuned(path).settings
 
 
-class _FromFile(DDCS):
-    """The settings of one file, played on every scenario."""
-
-    trained_splits = ("train",)
-
-
-def from_file(path: Path) -> DDCS:
-    """Return the policy of a file of tuned settings; it plays them on every scenario.
-
-    Raises:
-        PolicyError: The file is missing or damaged.
-    """
-    found = read_tuned(path)
-    return _FromFile(found.settings, f"{found.policy}-tuned-{found.scenario}")
-
-
-@dataclass(frozen=True)
-class TunedFile:
-    """What ``posse tune`` found.
+class TunedFile(DDCS):
+    """A DDCS policy that plays the settings of one file on every scenario.
 
     Attributes:
-        policy: The policy whose settings were tuned.
+        policy: Name of the policy whose settings were tuned.
         scenario: Name of the scenario that they were tuned for.
         settings: All settings of the tuned policy.
         card: Everything that the file says.
     """
 
-    policy: str
-    scenario: str
-    settings: Settings
-    card: Mapping[str, Any] = field(repr=False)
+    trained_splits = ("train",)
+
+    def __init__(self, settings: Settings, policy: str, scenario: str, card: Mapping[str, Any]) -> None:
+        super().__init__(settings, f"{policy}-tuned-{scenario}")
+        self.policy, self.scenario, self.card = policy, scenario, card
 
 
 def tuned_files(name: str) -> dict[str, Path]:
@@ -88,7 +71,7 @@ def tuned_files(name: str) -> dict[str, Path]:
 
 
 def read_tuned(path: Path) -> TunedFile:
-    """Return a file of tuned settings.
+    """Return the policy of a file of tuned settings.
 
     Raises:
         PolicyError: It is missing, damaged, of an unknown policy, or has a setting that is not
@@ -120,4 +103,4 @@ def read_tuned(path: Path) -> TunedFile:
         settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
     except (TypeError, ValueError, OverflowError) as error:
         raise PolicyError(f"{path} has impossible settings: {error}") from error
-    return TunedFile(policy, scenario, settings, card)
+    return TunedFile(settings, policy, scenario, card)

@@ -27,9 +27,9 @@ def test_a_name_loads_the_policy_that_bears_it(name: str) -> None:
     ("name", "message"),
     [
         ("ddcs-distribute", "did you mean 'ddcs-distributed'"),
-        ("nothing-like-it", "policies are: random, idle, pursuit"),
+        ("nothing-like-it", "known: random, idle, pursuit"),
         ("no_such_module:Team", "cannot import 'no_such_module'"),
-        ("posse_baselines.ddcs:DDSC", "has no 'DDSC' .did you mean 'DDCS'"),
+        ("posse_baselines.ddcs:DDSC", "unknown name 'DDSC' .did you mean 'DDCS'"),
         ("posse_baselines.ddcs:Settings", "is not a policy: it must have name"),
         *((text, "names no class: write") for text in (":x", "x:", "a..b:C", "a b:C", "a\0b:c")),
         ("x" * 5000, "unknown policy"),

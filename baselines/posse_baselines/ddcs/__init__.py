@@ -6,7 +6,7 @@ layer                 where it is
 monitoring            :mod:`~posse_baselines.ddcs.monitoring`: an estimate of the target, a table of team-mates
 target tracking       :mod:`~posse_baselines.ddcs.roles`: leader and slots; :mod:`~posse_baselines.ddcs.motion`: the
                       four tasks and their laws; :mod:`~posse_baselines.ddcs.searching`
-motor actuation       :mod:`~posse_baselines.ddcs.surroundings`, then :mod:`posse_baselines.laws.safeguard`
+motor actuation       :mod:`~posse_baselines.ddcs.actuation`, then :mod:`posse_baselines.laws.safeguard`
 ====================  ===============================================================================================
 
 :mod:`~posse_baselines.ddcs.baseline` says what the baseline PNGL + l-φ is; :mod:`~posse_baselines.ddcs.step` is one

@@ -12,7 +12,7 @@ leader, near (flocking)          PNGL, the speed of (13) with a correction of th
 follower, far (converging)       intercepts its place on the leader at full speed        ``motion.move``,
                                                                                          ``laws.steering``
 follower, near (flocking)        l-φ on the leader, figure 6                             ``motion.follow``,
-                                                                                         ``laws.l_phi``
+                                                                                         ``laws.formation``
 everyone, leader exchanged       holds the flock's course until it hears the new leader  ``motion.move``
 everyone, always                 regulates its heading, section 3.3; avoids contact      ``laws.guidance``,
                                                                                          ``laws.safeguard``

@@ -8,13 +8,14 @@ and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in com
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import MOST_THREADS, FloatArray, Record, Records, compiled
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
 from posse.rules import beam_directions
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
@@ -22,6 +23,9 @@ from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.offsets import constants_of, offsets_of, unit_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
 
+Kernel = Callable[..., None]
+Seen = npt.NDArray[np.uint16]
+"""A tracker's map (GRID²,), or (0,): own step + 1 at which a cell was last covered."""
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
 MOST_WAITING: Final = 10
@@ -179,8 +183,16 @@ class Minds(NamedTuple):
     """(E, N) :data:`MIND`."""
     mates: Records
     """(E, N, N) :data:`MATE`, the second N by the mate's number."""
-    seen: npt.NDArray[np.uint16]
+    seen: Seen
     """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
+
+    def restart(self, mask: BoolArray) -> None:
+        """Forget all in the worlds of a mask (E,), whose episodes restart."""
+        self.me[mask], self.mates[mask], self.seen[mask] = MIND_AT_START, MATE_AT_START, 0
+
+    def run(self, kernel: Kernel, rows: FloatArray, out: FloatArray) -> None:
+        """Run a kernel of :func:`for_each` on the observations (E, N, F); it writes to ``out`` (E, N, ...)."""
+        over_worlds(kernel, (self, work_for(self.mates.shape[2]), rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
@@ -188,6 +200,33 @@ class Minds(NamedTuple):
         for name, records in (("me", self.me), ("mates", self.mates)):
             arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
         return arrays
+
+
+def minds_for(layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int, *, searches: bool) -> Minds:
+    """Return the memory of so many robots of a team in each world, with the map that a search needs or without."""
+    minds = Minds(
+        team_of(layout, settings),
+        np.empty((num_worlds, robots), MIND),
+        np.empty((num_worlds, robots, layout.scenario.num_trackers), MATE),
+        np.empty((num_worlds, robots, GRID * GRID if searches else 0), np.uint16),
+    )
+    minds.restart(np.ones(num_worlds, np.bool_))
+    return minds
+
+
+def for_each(function: Kernel) -> Kernel:
+    """Return a kernel that calls ``function(team, me, mates, seen, row, work, out)`` for every tracker."""
+
+    @kernel
+    def run(minds: Minds, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
+        shared = minds.team
+        team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread], works.plays[thread])
+        for e in range(first, end):
+            for i in range(rows.shape[1]):
+                function(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], rows[e, i], work, out[e, i])
+
+    return run
 
 
 @compiled

@@ -32,7 +32,7 @@ from posse_baselines.ddcs.settings import (
     PNGL,
     SEARCHING,
 )
-from posse_baselines.laws import guidance, l_l, l_phi, steering
+from posse_baselines.laws import formation, guidance, steering
 from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
@@ -220,7 +220,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
 
 
 @compiled
-def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[l_phi.Demand, float]:
+def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[formation.Demand, float]:
     """Return the demand of l-φ on the control point c_j by a team-mate in its ``slot``, and the wanted direction of l.
 
     c_j is wanted where it lies when the robot is in its place, and heads as one does there.
@@ -231,15 +231,15 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[l_phi.De
     heading = steering.slot_heading(velocity, ref.frame_rate, arm, ref.frame)
     l_now, angle = guidance.line_of_sight(ref.position, me.position + scaled(me.heading, offset))
     l_d, wanted = guidance.line_of_sight(ref.position, ref.place + vector(offset, heading))
-    demand = l_phi.l_phi_demand(
-        l_phi.Polar(l_now, wrap(angle - ref.theta)),
-        l_phi.Polar(l_d, wrap(wanted - ref.theta)),
+    demand = formation.l_phi_demand(
+        formation.Polar(l_now, wrap(angle - ref.theta)),
+        formation.Polar(l_d, wrap(wanted - ref.theta)),
         ref.speed,
         ref.frame_rate,
-        l_phi.sampled_rate(settings.alpha_1, me.dt),
-        l_phi.sampled_rate(settings.alpha_2, me.dt),
+        formation.sampled_rate(settings.alpha_1, me.dt),
+        formation.sampled_rate(settings.alpha_2, me.dt),
     )
-    return l_phi.Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
+    return formation.Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
 
 
 @compiled
@@ -272,11 +272,11 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     """
     offset = team.settings.point_offset
     demand, wanted = demand_by(team, me, mates[me.leader], 0)
-    velocity = l_phi.point_velocity(demand)
+    velocity = formation.point_velocity(demand)
     second = second_of(team, me, mates) if team.settings.follower_law == L_L else -1
     if second >= 0:
         other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
-        velocity = l_l.l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)
+        velocity = formation.l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)
     me.wish = velocity * me.heading
-    speed, omega = l_phi.held_command(velocity, offset, me.dt)
-    me.wish_speed, me.wish_omega = l_phi.limit_command(me, speed, omega, offset)
+    speed, omega = formation.held_command(velocity, offset, me.dt)
+    me.wish_speed, me.wish_omega = formation.limit_command(me, speed, omega, offset)

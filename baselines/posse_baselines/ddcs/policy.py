@@ -10,24 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
+from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.ddcs.belief import BELIEF_SIZE, write_belief
-from posse_baselines.ddcs.memory import (
-    GRID,
-    MATE,
-    MATE_AT_START,
-    MIND,
-    MIND_AT_START,
-    Minds,
-    Team,
-    Work,
-    team_of,
-    work_for,
-)
+from posse_baselines.ddcs.belief import BELIEF_SIZE
+from posse_baselines.ddcs.memory import Kernel, Minds, minds_for
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.ddcs.step import carry_out, correct, plan
+from posse_baselines.ddcs.step import carry_out_all, propose_all
 from posse_baselines.laws.offsets import in_units, unit_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
 
@@ -83,21 +72,13 @@ class DDCS(OwnArrays, BasePolicy):
         """
         check_fits(self, layout)
         scenario = layout.scenario
-        n = scenario.num_trackers
-        cells = GRID * GRID if math.isfinite(scenario.sensing_range) else 0
-        minds = Minds(
-            team_of(layout, self.settings_for(scenario)),
-            np.empty((num_worlds, n), MIND),
-            np.empty((num_worlds, n, n), MATE),
-            np.empty((num_worlds, n, cells), np.uint16),
-        )
-        memory = _Memory(layout, minds)
-        return self.restart(memory, np.ones(num_worlds, np.bool_))
+        searches = math.isfinite(scenario.sensing_range)
+        minds = minds_for(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers, searches=searches)
+        return _Memory(layout, minds)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        minds: Minds = memory.minds
-        minds.me[mask], minds.mates[mask], minds.seen[mask] = MIND_AT_START, MATE_AT_START, 0
+        memory.minds.restart(mask)
         return memory
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -105,13 +86,15 @@ class DDCS(OwnArrays, BasePolicy):
         proposals, memory = self.propose(observations, memory)
         return self.carry_out(observations, memory, np.zeros_like(proposals))
 
-    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+    def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
 
-        Ahead and to the left of each tracker, as shares of its greatest speed. The first half of
+        Ahead and to the left of each tracker, as shares of its greatest speed; with ``believes`` followed by what it
+        believes, in the order of :mod:`posse_baselines.ddcs.belief`: (E, N, 2 + BELIEF_SIZE). The first half of
         :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
         """
-        return self._over_worlds(_propose, observations, memory, 2), memory
+        proposals = np.zeros((*memory.minds.me.shape, 2 + BELIEF_SIZE if believes else 2), np.float32)
+        return self._run(propose_all, observations, memory, proposals), memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
@@ -119,31 +102,15 @@ class DDCS(OwnArrays, BasePolicy):
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
         give the actions of :meth:`act`.
         """
-        size = 2 + memory.layout.scenario.message_size
-        return self._over_worlds(_carry_out, observations, memory, size, corrections), memory
+        actions = np.zeros((*memory.minds.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
+        actions[..., :2] = corrections
+        return self._run(carry_out_all, observations, memory, actions), memory
 
-    def _over_worlds(
-        self, kernel: Any, observations: FloatArray, memory: Memory, size: int, given: FloatArray | None = None
-    ) -> FloatArray:
-        """Return what a kernel writes for each tracker, (E, N, size), over the numbers that are ``given``, if any."""
+    def _run(self, kernel: Kernel, observations: FloatArray, memory: Memory, out: FloatArray) -> FloatArray:
         minds: Minds = memory.minds
-        num_worlds, n = minds.me.shape
-        observations = in_units(memory.layout, check_observations(self, observations, num_worlds, memory.layout))
-        out = np.zeros((num_worlds, n, size), np.float32)
-        if given is not None:
-            out[..., : given.shape[-1]] = given
-        over_worlds(kernel, (minds, work_for(n), observations, out), num_worlds, n)
+        rows = check_observations(self, observations, len(minds.me), memory.layout)
+        minds.run(kernel, in_units(memory.layout, rows), out)
         return out
-
-    def belief(self, memory: Memory) -> FloatArray:
-        """Return what each tracker believes after :meth:`propose`, (E, N, BELIEF_SIZE).
-
-        The order is that of :mod:`posse_baselines.ddcs.belief`.
-        """
-        minds: Minds = memory.minds
-        beliefs = np.empty((*minds.me.shape, BELIEF_SIZE), np.float32)
-        over_worlds(_believe, (minds, beliefs), *minds.me.shape)
-        return beliefs
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).
@@ -166,44 +133,3 @@ class DDCS(OwnArrays, BasePolicy):
         """Return the trackers' memory, field by field, as views."""
         minds: Minds = memory.minds
         return minds.arrays()
-
-
-@kernel
-def _propose(
-    minds: Minds, work: Work, observations: FloatArray, proposals: FloatArray, thread: int, first: int, end: int
-) -> None:
-    """Plan in a share of worlds; write the wanted velocities (E, N, 2), ahead and left, in shares of the top speed."""
-    shared = minds.team
-    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
-    for e in range(first, end):
-        for i in range(observations.shape[1]):
-            me = minds.me[e, i]
-            plan(team, me, minds.mates[e, i], minds.seen[e, i], observations[e, i], mine)
-            own = me.wish * me.heading.conjugate()
-            proposals[e, i, 0], proposals[e, i, 1] = own.real / me.max_speed, own.imag / me.max_speed
-
-
-@kernel
-def _carry_out(
-    minds: Minds, work: Work, observations: FloatArray, actions: FloatArray, thread: int, first: int, end: int
-) -> None:
-    """Carry out the plans of a share of worlds, corrected by what stands in the actions' first two numbers."""
-    shared = minds.team
-    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
-    for e in range(first, end):
-        for i in range(observations.shape[1]):
-            me, action = minds.me[e, i], actions[e, i]
-            correct(me, complex(float(action[0]), float(action[1])))
-            carry_out(team, me, minds.mates[e, i], observations[e, i], mine, action)
-
-
-@kernel
-def _believe(minds: Minds, beliefs: FloatArray, thread: int, first: int, end: int) -> None:
-    """Write the beliefs (E, N, BELIEF_SIZE) of a share of worlds."""
-    shared = minds.team
-    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-    for e in range(first, end):
-        for i in range(minds.me.shape[1]):
-            write_belief(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], beliefs[e, i])

@@ -1,4 +1,4 @@
-"""A control step of the DDCS: monitoring and tracking (:func:`plan`), then actuation (:func:`carry_out`).
+"""A control step of the DDCS: monitoring and tracking (:func:`propose`), then actuation (:func:`carry_out`).
 
 Between the two, a wanted velocity may be corrected. The correction comes before the safeguard, so that a corrected
 team avoids contact as well as the team itself does.
@@ -6,13 +6,10 @@ team avoids contact as well as the team itself does.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.detour import detour
-from posse_baselines.ddcs.foresight import foresee, make_up, surround_ahead
-from posse_baselines.ddcs.memory import Team, Work, read_body
+from posse_baselines.ddcs.actuation import detour, foresee, make_up, surround, surround_ahead
+from posse_baselines.ddcs.belief import write_belief
+from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
@@ -24,12 +21,23 @@ from posse_baselines.laws.safeguard import safe_velocity
 
 
 @compiled
-def plan(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], row: FloatArray, work: Work) -> None:
-    """Monitor and track: set the wanted velocity of one tracker for its observation (F,)."""
+def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
+    """Take what one tracker observes (F,) into its memory."""
     read_body(team, me, row)
-    # Monitoring
     watch_target(team, me, row)
     update_mates(team, me, mates, row)
+
+
+@compiled
+def propose(
+    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, proposal: FloatArray
+) -> None:
+    """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed.
+
+    What it believes is written behind that if there is room: (2,) or (2 + BELIEF_SIZE,).
+    """
+    # Monitoring
+    monitor(team, me, mates, row)
     look_around(team, me, mates, seen)
     foresee(team, me)
     # Tracking
@@ -47,6 +55,10 @@ def plan(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], r
         want(me, wander(team, me, mates, seen), 0.0)
     else:
         move(team, me, mates)
+    own = me.wish * me.heading.conjugate()
+    proposal[0], proposal[1] = own.real / me.max_speed, own.imag / me.max_speed
+    if len(proposal) > 2:
+        write_belief(team, me, mates, seen, proposal[2:])
 
 
 @compiled
@@ -69,8 +81,11 @@ def correct(me: Record, correction: complex) -> None:
 
 
 @compiled
-def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
-    """Actuate: write the action (2 + m,) of one tracker that realises its wanted velocity."""
+def carry_out(
+    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray
+) -> None:
+    """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
+    correct(me, complex(float(action[0]), float(action[1])))
     discs = work.discs[: surround_ahead(team, me, mates, row, work.discs)]
     velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
     if team.settings.detour > 0.0 and me.task != FLOCKING:
@@ -83,3 +98,19 @@ def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Wor
     write_motion(action, speed, omega, me.max_speed, me.max_omega)
     write_message(team, me, row, action)
     me.step += 1
+
+
+@compiled
+def guard(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray) -> None:
+    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten."""
+    monitor(team, me, mates, row)
+    wanted = complex(float(action[0]), float(action[1]))
+    wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
+    discs = work.discs[: surround(team, me, mates, row, work.discs)]
+    velocity, _ = safe_velocity(me, discs, wanted, work.plays)
+    speed, omega = regulate(me, velocity, 0.0)
+    write_motion(action, speed, omega, me.max_speed, me.max_omega)
+    me.step += 1
+
+
+propose_all, carry_out_all, guard_all = for_each(propose), for_each(carry_out), for_each(guard)

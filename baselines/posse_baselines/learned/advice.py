@@ -67,9 +67,7 @@ class Advising:
         if self.correction == "motion":
             actions, memory = self.adviser.act(observations, memory)
             return actions[..., :MOTION], actions, memory
-        proposals, memory = self.adviser.propose(observations, memory)
-        if self._believes:
-            proposals = np.concatenate([proposals, self.adviser.belief(memory)], axis=-1)
+        proposals, memory = self.adviser.propose(observations, memory, believes=self._believes)
         return proposals, observations, memory
 
     def answer(self, asked: FloatArray, outputs: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
+from posse.engine.batch import Batch
 from posse.engine.infos import Infos
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray, OwnArrays
@@ -57,8 +58,6 @@ class BatchEnv:
     """The robots that an agent moves, as rows of the batch: one, or all."""
     _fit: Callable[..., Scenario] = staticmethod(get_scenario)
     """Returns the scenario of a name, or a scenario, and overrides."""
-    _silent = False
-    """Whether actions are without the message."""
 
     def __init__(
         self,
@@ -78,7 +77,7 @@ class BatchEnv:
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.batch = batch(
+        self.batch = self._make(
             self._fit(scenario, **overrides),
             num_worlds,
             target_policy=target_policy,
@@ -98,12 +97,16 @@ class BatchEnv:
         self._seeded = seed is not None
         self._renderer: Any = None
 
+    def _make(self, scenario: Scenario, num_worlds: int, target_policy: TargetPolicy | None, **settings: Any) -> Batch:
+        """Return the worlds."""
+        return batch(scenario, num_worlds, target_policy=target_policy, **settings)
+
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
 
     def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Return the spaces of an agent's observations and actions."""
-        scenario = self.scenario.replace(message_size=0) if self._silent else self.scenario
+        scenario = self.scenario.replace(message_size=self.batch.action_shape[2] - 2)
         observation, action = box(*self.layout.bounds()), single_action_space(scenario, self._discrete)
         if isinstance(self._rows, int):
             return observation, action

@@ -80,7 +80,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
         self._shape = self.action_space.shape
-        self._rows_shape = 1, -1, 2 if self._silent else self.batch.action_shape[2]
+        self._rows_shape = 1, -1, self.batch.action_shape[2]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

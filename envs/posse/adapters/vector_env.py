@@ -85,7 +85,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ValueError: Actions out of their space; nothing is changed.
         """
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
-        observations, rewards, terminated, truncated, found = self.batch.step(self._of_team(motions))
+        observations, rewards, terminated, truncated, found = self.batch.step(motions.reshape(self.batch.action_shape))
         self._show()
         ended, last = terminated | truncated, found.pop("final_obs", None)
         infos, more = self._own(found), {}
@@ -101,10 +101,6 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         own = rewards[:, self._rows].reshape(self.num_envs, -1).mean(axis=1, dtype=np.float64)
         infos = _with_masks(infos, np.ones(self.num_envs, np.bool_))
         return self._observed(observations), own, terminated, truncated, infos | more
-
-    def _of_team(self, own: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
-        return own.reshape(self.batch.action_shape)
 
     def _observed(self, observations: FloatArray) -> FloatArray:
         """Return the agents' part of the observations."""

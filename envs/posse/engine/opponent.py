@@ -1,4 +1,4 @@
-"""A batch in which a policy moves one side: the target, or the trackers."""
+"""A batch in which a policy moves some robots: the target, the trackers, or all trackers but one."""
 
 from __future__ import annotations
 
@@ -43,17 +43,19 @@ class TargetPolicy(Protocol):
 
 
 class PairedBatch(Batch):
-    """A batch whose target, or whose trackers, are moved by a policy inside.
+    """A batch in which a policy inside moves the target, the trackers, or the team-mates of one tracker.
 
-    Observations, actions, rewards and infos have a row for each robot of the other side only. All else is as in
-    :class:`Batch`; copies of the worlds are a plain batch, and a snapshot has no memory of the policy.
+    Observations, actions, rewards and infos have a row for each robot that is moved from outside only. All else is as
+    in :class:`Batch`; copies of the worlds are a plain batch, and a snapshot has no memory of the policy.
 
     Args:
-        scenario: Settings of the worlds; their target becomes an agent.
+        scenario: Settings of the worlds; their target becomes an agent if one side is moved from outside.
         num_worlds: E, at least 1.
-        inside: Moves its side; ``begin``, ``act`` and ``restart`` as :class:`TargetPolicy` has
-            them, with a row for each robot that it moves.
-        moves_target: Whether its side is the target, else the trackers.
+        inside: Moves the others; ``begin``, ``act`` and ``restart`` as :class:`TargetPolicy` has them, with a row for
+            each robot that it moves. The team-mates of a tracker are moved by a policy of the whole team, whose action
+            for that tracker is not executed. One with ``watch`` is given this batch, whose state it may read.
+        outside: ``"trackers"``, ``"target"``, or the number of a tracker.
+        silent: Whether actions from outside are without the message.
         settings: Further arguments of :class:`Batch`.
 
     Attributes:
@@ -61,22 +63,42 @@ class PairedBatch(Batch):
         everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), the target's row
             last.
         observation_shape: (E, rows, F).
-        action_shape: (E, rows, 2 + message_size); (E, 1, 2) for the target, which sends no messages.
+        action_shape: (E, rows, 2 + message_size); (E, rows, 2) for the target, which sends no messages, and a silent
+            tracker.
     """
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int, inside: TargetPolicy, *, moves_target: bool, **settings: Any
+        self,
+        scenario: Scenario,
+        num_worlds: int,
+        inside: TargetPolicy,
+        *,
+        outside: str | int,
+        silent: bool = False,
+        **settings: Any,
     ) -> None:
-        super().__init__(scenario.replace(target_motion="agent"), num_worlds, **settings)
-        self.inside, self.moves_target = inside, moves_target
+        one = isinstance(outside, int)
+        super().__init__(scenario if one else scenario.replace(target_motion="agent"), num_worlds, **settings)
+        self.inside, self.outside = inside, outside
         worlds, rows, length = self._all_actions = self.action_shape
-        trackers, target = slice(0, rows - 1), slice(rows - 1, rows)
-        self._mine, self._theirs = (trackers, target) if moves_target else (target, trackers)
-        shapes = (worlds, rows - 1, length), (worlds, 1, 2)
-        self.action_shape, self._their_shape = shapes if moves_target else shapes[::-1]
+        team, target = slice(0, scenario.num_trackers), slice(rows - 1, rows)
+        self._mine, self._theirs = (team, target) if outside == "trackers" else (target, team)
+        if isinstance(outside, int):
+            self._mine = slice(outside, outside + 1)
+        mine, theirs = (len(range(rows)[part]) for part in (self._mine, self._theirs))
+        self.action_shape = worlds, mine, 2 if silent or outside == "target" else length
+        self._their_shape = worlds, theirs, 2 if outside == "trackers" else length
         self.observation_shape = (*self.action_shape[:2], self.layout.size)
+        if hasattr(inside, "watch"):
+            inside.watch(self)
         self.memory = inside.begin(self.layout, worlds)
         self._seen = np.zeros((*self._their_shape[:2], self.layout.size), np.float32)
+
+    @property
+    def working(self) -> BoolArray:
+        """Whether each tracker that is not moved by the policy inside works, (E, rows); all if the target is not."""
+        working = super().working
+        return working[:, self._mine] if isinstance(self.outside, int) else working
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world; see :meth:`Batch.reset`."""
@@ -111,17 +133,18 @@ class PairedBatch(Batch):
 
     def _with_theirs(self, mine: FloatArray) -> tuple[FloatArray, Any]:
         """Return the actions of all robots, and the memory of the policy inside."""
-        who = "target's" if self.moves_target else "team's"
+        who = "target's" if self.outside == "trackers" else "team's"
         chosen, memory = self.inside.act(self._seen, self.memory)
         array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
         theirs = np.ascontiguousarray(array[:, :, : wanted[2]])
         whole = np.zeros(self._all_actions, np.float32)
-        whole[:, self._mine, : mine.shape[2]] = mine
         whole[:, self._theirs, : wanted[2]] = in_box(
             theirs, self.clip_actions, f"the {who} policy returned actions, of which [{{}}, {{}}, {{}}]".format
         )
+        whole[:, self._mine] = 0
+        whole[:, self._mine, : mine.shape[2]] = mine
         return whole, memory
 
 
@@ -169,7 +192,8 @@ def batch(
             f"{side}_policy={reprlib.repr(inside)} is not the policy of a {side}: it has no "
             f"{', '.join(missing)} (posse.TargetPolicy)"
         )
-    return PairedBatch(found, num_worlds, inside, moves_target=side == "target", **settings)
+    outside = "trackers" if side == "target" else "target"
+    return PairedBatch(found, num_worlds, inside, outside=outside, **settings)
 
 
 def batches(

@@ -23,9 +23,9 @@ def test_a_team_in_formation_believes_what_is_so() -> None:
     batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     for _ in range(250):
-        proposals, memory = ddcs.propose(observations, memory)
-        belief, state = ddcs.belief(memory), {k: v.copy() for k, v in batch.state.items()}
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
+        proposals, memory = ddcs.propose(observations, memory, believes=True)
+        belief, state = proposals[..., 2:], {k: v.copy() for k, v in batch.state.items()}
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
         observations = batch.step(actions)[0]
     assert belief.shape == (8, 5, BELIEF_SIZE)
     x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
@@ -54,13 +54,13 @@ def test_who_searches_believes_nothing_of_the_target() -> None:
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     lost = []
     for _ in range(20):
-        proposals, memory = ddcs.propose(observations, memory)
-        belief = ddcs.belief(memory)
+        proposals, memory = ddcs.propose(observations, memory, believes=True)
+        belief = proposals[..., 2:]
         searching = belief[..., TASK_AT + SEARCHING] == 1.0
         assert searching.any()
         assert not belief[searching][:, TARGET_AT : TARGET_AT + 9].any()
         assert not belief[searching][:, SLOT_AT : SLOT_AT + 7].any()
         lost.append(belief[searching][:, SEARCH_AT].max())
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
         observations = batch.step(actions)[0]
     np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from posse_baselines.ddcs.detour import turn_past
+from posse_baselines.ddcs.actuation import turn_past
 from posse_baselines.laws.safeguard import DISC, put_disc
 
 CLEARANCE = 0.2

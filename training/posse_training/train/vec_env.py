@@ -382,5 +382,4 @@ def _arrays_inside(batch: Batch) -> dict[str, npt.NDArray[Any]]:
 
 def _own_score(batch: Batch, score: float) -> float:
     """Return the score of the side that learns: a target's is what it denies the team."""
-    learns = isinstance(batch, PairedBatch) and not batch.moves_target
-    return 1 - score if learns else score
+    return 1 - score if isinstance(batch, PairedBatch) and batch.outside == "target" else score

@@ -1,0 +1,257 @@
+"""The actuation layer, before the safeguard: what is near, ways past it, and commands that are executed late.
+
+**Surroundings.** The nearby discs of a tracker: known ones, and unexplained echoes of the sonar.
+
+**Detours.** The safeguard looks one and a half seconds ahead. In front of a wide obstacle no small change of
+direction helps, and it slows down. A detour turns the wanted velocity to the edge of what is in the
+way, and keeps to the side that it began with.
+
+**Foresight.** Where commands are delayed or lag, decisions are for the moment at which they are executed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import FloatArray, Record, Records, compiled
+from posse_baselines.ddcs.memory import MOST_WAITING, Team
+from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
+from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
+from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls, to_wall
+from posse_baselines.laws.steering import slot_velocity
+
+_SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
+_EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
+_TAKEN_TIME: Final = 3.0  # s; longest time for which a slot counts as taken after an echo from it
+_MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
+_FORGOTTEN: Final = 30.0  # s; silence after which a team-mate is no longer assumed at its last position
+_SIDE_KEPT: Final = 1.5  # s
+_LARGEST: Final = 2.0  # m; reach of a disc; walls are larger
+_MOST_TURN: Final = 2.0  # rad; farther round is no way past
+_ROUNDS: Final = 6
+
+
+# --- surroundings --------------------------------------------------------------------------------
+
+
+@compiled
+def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading: float) -> bool:
+    """Return whether one of the known robots (discs), or a wall, explains a sonar reading (m) along a beam."""
+    world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
+    reach = reading + 2.0 * radius + _EXPLAINED
+    for j in range(len(robots)):
+        place = robots[j].place
+        square = dot(place, place)
+        if square > reach * reach:
+            continue
+        # A little wider than beam and disc, since the position is not exact.
+        along = dot(place, beam)
+        if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(cross(place, beam)) < radius + 0.1):
+            return True
+    if world.walled:
+        for k in range(4):
+            away, towards = to_wall(world, k, me.position), dot(WALLS[k], beam)
+            if away < NEAR and towards > 0.0:
+                away = away / towards if towards < wide_beam else away
+                if reading >= away - radius - _EXPLAINED:
+                    return True
+    return False
+
+
+@compiled
+def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
+    """Return the slot whose occupant would give this echo, or -1.
+
+    Where not all team-mates have a place in the observation, an echo from a slot is attributed to
+    one of them, moving with the formation.
+    """
+    for k in range(len(team.slots)):
+        way = me.target + team.slots[k] * me.frame - me.position
+        distance = length(way)
+        fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
+        if fits and dot(way, beam) >= team.world.wide_beam * distance:
+            return k
+    return -1
+
+
+@compiled
+def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+    """List the nearby discs; return their number."""
+    at, world, settings = team.at, team.world, team.settings
+    count, two, radius = 0, 2.0 * world.radius, float(world.radius)
+    if me.known:
+        way = me.target - me.position
+        if dot(way, way) < NEAR * NEAR:
+            # In a chase the target is not avoided: the law ends the chase in time.
+            reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
+            count = put_disc(discs, count, way, me.target_velocity, reach, margin)
+    few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
+    for j in range(len(mates)):
+        mate = mates[j]
+        age = silence(team, me, mate)
+        if j == me.number or mate.step < 0 or age > _FORGOTTEN:
+            continue
+        position, velocity = mate_now(team, me, mate)
+        way = position - me.position
+        # If it were still there after a silence, it would have a place in the observation.
+        gone = few and age > patience(team, me) and length(way) < me.horizon
+        if dot(way, way) < NEAR * NEAR and not gone:
+            margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
+            count = put_disc(discs, count, way, velocity, two, margin)
+    robots = count
+    if world.walled:
+        count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
+    strangers = me.known != 0 and few
+    if not strangers or me.step % max(1, round(_TAKEN_TIME / world.dt)) == 0:
+        me.taken = np.uint64(0)
+    for k in range(at.sonar_beams):
+        reading = float(row[at.sonar + k])
+        beam = team.beams[k] * me.heading
+        if reading >= world.sonar_range - _EXPLAINED or is_explained(team, me, discs[:robots], beam, reading):
+            continue
+        slot = slot_in_beam(team, me, beam, reading) if strangers else -1
+        if slot >= 0:
+            me.taken |= np.uint64(1) << np.uint64(slot)
+            arm = team.slots[slot] * me.frame
+            velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
+            count = put_disc(discs, count, me.target + arm - me.position, velocity, two, settings.margin)
+            continue
+        # Its position within the beam is unknown: a disc that fills most of the beam.
+        wide = min(0.5, 0.4 * (reading + radius))
+        place = scaled(beam, reading + radius + wide)
+        count = put_disc(discs, count, place, 0j, wide + radius, settings.echo_margin)
+    return count
+
+
+# --- detours -------------------------------------------------------------------------------------
+
+
+@compiled
+def blocks(disc: Record, clearance: float, unit: complex) -> bool:
+    """Return whether a standing disc lies on the way along a unit vector, nearer than clearance."""
+    if disc.velocity != 0j or disc.reach > _LARGEST:
+        return False
+    # A little less than the tangent's clearance, or the tangent itself would be blocked.
+    return dot(disc.place, unit) > 0.0 and abs(cross(disc.place, unit)) < 0.98 * (disc.reach + clearance)
+
+
+@compiled
+def turn_past(discs: Records, clearance: float, wanted: complex, side: float) -> float:
+    """Return the turn (rad, left positive) from a unit vector to a clear direction on a side (1: left, -1: right).
+
+    ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
+    """
+    turn, unit = 0.0, wanted
+    for _ in range(_ROUNDS):
+        least, nearest = 1e9, -1
+        for k in range(len(discs)):
+            if blocks(discs[k], clearance, unit):
+                distance = length(discs[k].place)
+                if distance < least:
+                    least, nearest = distance, k
+        if nearest < 0:
+            return turn
+        disc = discs[nearest]
+        half = math.asin(min(1.0, (disc.reach + clearance) / max(least, 1e-6)))
+        # From the wanted direction to the disc's centre, then to its edge.
+        turn = angle_of(disc.place * wanted.conjugate()) + side * half
+        if abs(turn) > _MOST_TURN:
+            return 2.0 * _MOST_TURN
+        unit = wanted * vector(1.0, turn)
+    return 2.0 * _MOST_TURN
+
+
+@compiled
+def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
+    """Return the wanted velocity (m/s), turned past what stands in its way."""
+    speed, clearance = length(wanted), team.settings.detour
+    if speed < 1e-6:
+        return wanted
+    unit = complex(wanted.real / speed, wanted.imag / speed)
+    left, right = turn_past(discs, clearance, unit, 1.0), turn_past(discs, clearance, unit, -1.0)
+    if left == 0.0 and right == 0.0:
+        return wanted
+    kept = me.side if (me.step - me.side_step) * team.world.dt <= _SIDE_KEPT else 0
+    goes_left = abs(left) < abs(right)
+    if kept != 0 and abs(left if kept > 0 else right) <= _MOST_TURN:
+        goes_left = kept > 0
+    turn = left if goes_left else right
+    if abs(turn) > _MOST_TURN:
+        return wanted
+    me.side, me.side_step = 1 if goes_left else -1, me.step
+    return wanted * vector(1.0, turn)
+
+
+# --- foresight -----------------------------------------------------------------------------------
+
+
+@compiled
+def delay_of(team: Team) -> int:
+    """Return the delay that is foreseen, in control steps."""
+    settings, delay = team.settings, int(team.world.delay)
+    return delay if settings.foresight > 0.0 and delay <= MOST_WAITING else 0
+
+
+@compiled
+def foresee(team: Team, me: Record) -> None:
+    """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
+    delay, dt = delay_of(team), float(team.world.dt)
+    me.lead, me.moved, me.turned = 0.0, 0j, 1.0 + 0j
+    if delay == 0:
+        return
+    start = me.heading
+    for k in range(delay):
+        waiting = me.waiting[(me.step + k) % delay]
+        speed, omega = me.speed, me.omega
+        change, turn_change = me.acceleration * dt, me.turn_acceleration * dt
+        me.speed += clip(team.world.followed * (waiting.real - speed), -change, change)
+        me.omega += clip(team.world.followed * (waiting.imag - omega), -turn_change, turn_change)
+        mean, turn = me.speed, me.omega * dt
+        if team.world.followed < 1.0:
+            mean, turn = 0.5 * (speed + me.speed), 0.5 * (omega + me.omega) * dt
+        me.moved += scaled(me.heading * vector(1.0, 0.5 * turn), mean * dt)
+        me.heading *= vector(1.0, turn)
+    me.turned = me.heading * start.conjugate()
+    me.lead = delay * dt
+    me.position += me.moved
+    if me.known:
+        me.target, me.target_theta = target_after(team, me, me.fix_age + me.lead)
+        me.target_velocity = vector(me.target_speed, me.target_theta)
+        me.frame *= vector(1.0, me.psi_rate * me.lead)
+
+
+@compiled
+def surround_ahead(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+    """List the discs that will be near when the command is executed; return their number.
+
+    The sonar measures from the present pose, so that the list is made there and taken along.
+    """
+    if me.lead <= 0.0:
+        return surround(team, me, mates, row, discs)
+    lead, position, heading, target = me.lead, me.position, me.heading, me.target
+    frame = me.frame
+    me.lead, me.position, me.heading = 0.0, position - me.moved, heading * me.turned.conjugate()
+    me.target = target - scaled(me.target_velocity, lead)
+    me.frame = frame * vector(1.0, -me.psi_rate * lead)
+    count = surround(team, me, mates, row, discs)
+    me.lead, me.position, me.heading, me.target, me.frame = lead, position, heading, target, frame
+    for k in range(count):
+        discs[k].place += scaled(discs[k].velocity, lead) - me.moved
+    return count
+
+
+@compiled
+def make_up(team: Team, me: Record, speed: float, omega: float) -> tuple[float, float]:
+    """Return the command (m/s, rad/s) that makes up for the lag, and remember it until it is executed."""
+    followed, share, delay = team.world.followed, team.settings.foresight, delay_of(team)
+    if followed < 1.0 and share > 0.0:
+        more = share * (1.0 / followed - 1.0)
+        speed += more * (speed - me.speed)
+        omega += more * (omega - me.omega)
+    if delay > 0:
+        kept = complex(clip(speed, 0.0, me.max_speed), clip(omega, -me.max_omega, me.max_omega))
+        me.waiting[me.step % delay] = kept
+    return speed, omega
