@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,9 +43,7 @@ def test_imports_run_one_way(package: str) -> None:
 @pytest.mark.parametrize("package", ["posse", "posse_baselines"])
 def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
     code = f"import sys, {package}; print(*sorted(set(sys.modules) & {LEARNING!r}))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == []
+    assert printed("-c", code).split() == []
 
 
 # A room imports only rooms before it.

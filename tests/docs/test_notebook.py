@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 import posse
 from posse_baselines import load, play
@@ -38,14 +36,8 @@ def test_the_notebook_runs(tmp_path: Path) -> None:
     pytest.importorskip("nbclient", reason="no nbclient: pip install '.[docs]'")
     out = tmp_path / "out.ipynb"
     short = {"POSSE_NOTEBOOK_STEPS": "1000", "POSSE_NOTEBOOK_EPISODES": "2"}
-    done = subprocess.run(
-        [sys.executable, DOCS / "drawing" / "notebook.py", "--out", out],
-        capture_output=True,
-        text=True,
-        timeout=600,
-        env={**os.environ, **short, **{name: str(tmp_path) for name in HOMES}},
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
+    script = DOCS / "drawing" / "notebook.py"
+    printed(script, "--out", out, **short, **{name: str(tmp_path) for name in HOMES})
     cells = json.loads(out.read_text(encoding="utf-8"))["cells"]
     text = [json.dumps(cell.get("outputs", "")) for cell in cells]
     assert sum("<iframe srcdoc" in outputs for outputs in text) == 2

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 import posse
 from posse_training.cli import COMMANDS, main
@@ -22,9 +21,8 @@ def test_a_command_imports_only_what_it_needs(words: list[str], heavy: tuple[str
         f"import sys\nfrom posse_training.cli import main\nassert main({words!r}) == 0\n"
         f"found = sorted(set({heavy!r}) & set(sys.modules))\nassert not found, found"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr
-    assert words != ["scenarios"] or all(name in done.stdout for name in posse.scenario_names())
+    text = printed("-c", code, seconds=120)
+    assert words != ["scenarios"] or all(name in text for name in posse.scenario_names())
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from PIL import Image
 from tests.support.learned import any_policy
+from tests.support.process import printed
 
 from posse_training import demo
 from posse_training.replay.page import read_replay
@@ -41,5 +40,4 @@ def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
 
 def test_it_needs_no_torch() -> None:
     code = "import sys, posse_training.demo; print('torch' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "False", done.stderr
+    assert printed("-c", code).strip() == "False"

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.process import printed
 
 import posse
 
@@ -73,14 +71,7 @@ for worlds, settings in (
 @pytest.mark.long
 def test_the_largest_worlds_fit_their_memory() -> None:
     """Compiled code does not check array bounds; plain Python does."""
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", LARGEST],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    printed("-W", "ignore", "-c", LARGEST, NUMBA_DISABLE_JIT="1")
 
 
 @pytest.mark.parametrize("worlds", [1, 8])
