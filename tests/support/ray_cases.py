@@ -1,4 +1,4 @@
-"""What only a Ray cluster can show; run by ``tests/training/cluster/test_ray.py`` where Ray is."""
+"""What only a Ray cluster can show; run by ``tests/training/cluster/test_cluster.py`` where Ray is."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def test_cleanrl_ppo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_every_tutorial_is_tried_and_has_its_place_in_the_manual() -> None:
     tests = Path(__file__).read_text()
     page = (ROOT / "docs" / "tutorials" / "index.md").read_text()
-    elsewhere = {"notebook.ipynb", "step_loop.py"}  # tests/docs/test_notebook.py
+    elsewhere = {"notebook.ipynb", "step_loop.py"}  # tests/docs/test_pages.py
     names = {path.name for path in TUTORIALS.iterdir() if path.suffix != ".md"}
     files = sorted(names - elsewhere)
     assert len(files) == 6

@@ -62,32 +62,6 @@ def test_only_a_rectangle_has_a_height() -> None:
         wide.reset(options={"target_pose": (0.0, 8.0, 0.0)})
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, 8, 12, 13, 40, 64])
-@pytest.mark.parametrize("name", ["constant", "radio"])
-def test_one_to_sixty_four_trackers_nearest_first(name: str, number: int) -> None:
-    batch = posse.batch(name, 2, num_trackers=number, num_neighbours=5, start_distance=(2.0, 8.0))
-    twelve = posse.batch(name, 2, num_trackers=12, num_neighbours=5)
-    assert batch.layout.size == twelve.layout.size, "the layout does not depend on N"
-    batch.reset(seed=6)
-    for _ in range(5):
-        observations = batch.step(np.zeros(batch.action_shape))[0]
-    assert observations.shape == (2, number, batch.layout.size)
-    views = batch.layout.views(observations)
-    filled = views["neighbour_number"] >= 0
-    ranges = np.where(filled, views["neighbour_range"], np.inf)
-    assert (ranges[..., 1:] >= ranges[..., :-1]).all()
-    if name == "constant":
-        assert (filled.sum(axis=-1) == min(5, number - 1)).all()
-        place = positions(one_world(snapshot(batch), 0))[:number]
-        away = np.abs(place[:, None] - place[None, :]) + np.diag(np.full(number, np.inf))
-        for i in range(number):
-            nearest = np.sort(away[i])[: min(5, number - 1)]
-            np.testing.assert_allclose(ranges[0, i][filled[0, i]], nearest, rtol=1e-5, atol=1e-5)
-    assert (views["neighbour_age"][~filled] == -1).all()
-    assert (views["neighbour_range"][~filled] == -1).all()
-    assert (views["neighbour_bearing"][~filled] == 0).all()
-
-
 @pytest.mark.parametrize("name", posse.scenario_names())
 def test_views_share_memory_and_cover_the_observation(name: str) -> None:
     batch = posse.batch(name, 2, message_size=2)
@@ -102,9 +76,3 @@ def test_views_share_memory_and_cover_the_observation(name: str) -> None:
             at = layout.offsets[field.name]
             part = observations[..., at : at + field.size]
             np.testing.assert_array_equal(part.squeeze(-1) if field.size == 1 else part, views[field.name])
-
-
-def test_observations_of_another_length_are_refused() -> None:
-    layout = posse.batch().layout
-    with pytest.raises(ValueError, match="last axis"):
-        layout.views(np.zeros((2, layout.size + 1)))
