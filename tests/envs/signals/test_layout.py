@@ -1,9 +1,12 @@
-"""The observation: fields against an independent computation, bounds, layout."""
+"""The observation: what the target is given, layout, and eight observers at once."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from tests.support.process import printed
 from tests.support.reference.senses import sonar
 from tests.support.reference.state import headings, one_world, positions, snapshot
 
@@ -76,3 +79,80 @@ def test_views_share_memory_and_cover_the_observation(name: str) -> None:
             at = layout.offsets[field.name]
             part = observations[..., at : at + field.size]
             np.testing.assert_array_equal(part.squeeze(-1) if field.size == 1 else part, views[field.name])
+
+
+WORLDS: dict[str, dict[str, Any]] = {
+    "smart": {"num_trackers": 5, "num_neighbours": 7, "message_size": 1},
+    "smart, one": {"num_trackers": 1, "num_neighbours": 0},
+    "smart, eight": {"num_trackers": 8, "num_neighbours": 3, "sonar_beams": 5, "message_size": 2},
+    "smart, the target an agent": {"num_trackers": 9, "num_neighbours": 8, "target_motion": "agent"},
+    "smart, sixteen": {"num_trackers": 16, "num_neighbours": 15},
+    "smart, some of sixteen": {"num_trackers": 16, "num_neighbours": 9, "message_size": 1},
+    "smart, seventeen": {"num_trackers": 17, "num_neighbours": 16, "message_size": 1},
+    "smart, sixty-four": {"num_trackers": 64, "num_neighbours": 63},
+    "constant": {"field_of_view": 2.0, "sensing_range": 9.0},
+    "obstacles": {"autoreset": "same_step"},
+    "radio": {"message_size": 2},
+    "leader-loss": {"autoreset": "same_step", "break_window": (0.2, 0.5)},
+    "field": {"num_trackers": 3},
+    "robots": {"command_delay": 2, "odometry_drift": 0.05, "heading_drift": 0.02, "heading_noise": 0.05},
+}
+COUNT = 11  # eight together, and three each alone
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
+    scenario = world.partition(",")[0]
+    make: dict[str, Any] = {"horizon": 31, "num_threads": 1, "seed": 4, "settle_time": 1.0, **WORLDS[world]}
+    together = posse.batch(scenario, COUNT, **make)
+    alone = [posse.batch(scenario, 1, first_world=e, **make) for e in range(COUNT)]
+    rng = np.random.default_rng(0)
+    outputs, expected = [together.reset()], [np.concatenate([each.reset() for each in alone])]
+    for step in range(40):  # past the horizon, where worlds start anew
+        for mine, theirs in zip(outputs, expected, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
+        *outputs, infos = together.step(actions)
+        outputs.append(infos["score"])
+        each = [world.step(actions[e : e + 1]) for e, world in enumerate(alone)]
+        expected = [np.concatenate(parts) for parts in zip(*(step[:4] for step in each), strict=True)]
+        expected.append(np.concatenate([step[4]["score"] for step in each]))
+        if step == 12:  # some start anew, in their midst some that are only looked at
+            mask = rng.random(COUNT) < 0.5
+            outputs[0] = together.reset(options={"reset_mask": mask})
+            for e in np.flatnonzero(mask):
+                expected[0][e] = alone[e].reset()[0]
+
+
+LARGEST = """
+import posse, numpy
+team = dict(num_trackers=64, num_neighbours=63, start_distance=(4.0, 40.0), num_threads=1)
+place = dict(arena=100.0, num_obstacles=60, obstacle_gap=0.3, sonar_beams=64)
+for worlds, settings in (
+    (1, dict(team, **place, target_motion="agent")),
+    (1, dict(team, radio_range=30.0)),
+    (8, dict(team, num_trackers=16, num_neighbours=9)),
+):
+    batch = posse.batch("smart", worlds, **settings)
+    batch.reset(seed=1)
+    batch.step(numpy.ones(batch.action_shape))
+"""
+
+
+@pytest.mark.long
+def test_the_largest_worlds_fit_their_memory() -> None:
+    """Compiled code does not check array bounds; plain Python does."""
+    printed("-W", "ignore", "-c", LARGEST, NUMBA_DISABLE_JIT="1")
+
+
+@pytest.mark.parametrize("worlds", [1, 8])
+def test_of_mates_as_near_the_lower_number_comes_first(worlds: int) -> None:
+    batch = posse.batch("constant", worlds, num_trackers=5)
+    # Four at the corners of a square round the last, in no order, and nothing to round.
+    corners = [(4.0, -4.0, 0.0), (-4.0, 4.0, 0.0), (4.0, 4.0, 0.0), (-4.0, -4.0, 0.0)]
+    poses = np.array([*corners, (0.0, 0.0, 0.0)])
+    observed = batch.layout.views(batch.reset(seed=0, options={"tracker_pose": poses}))
+    numbers, ranges = observed["neighbour_number"], observed["neighbour_range"]
+    assert (ranges[:, 4] == ranges[:, 4, :1]).all()
+    orders = [[4, 2, 3, 1], [4, 2, 3, 0], [4, 0, 1, 3], [4, 0, 1, 2], [0, 1, 2, 3]]
+    np.testing.assert_array_equal(numbers, np.broadcast_to(orders, numbers.shape))
