@@ -1,13 +1,13 @@
-"""Imports go from training to baselines to envs only, and playing does not import torch."""
+"""Imports go from training to baselines to envs only; the tests named on the page docs/reliability.md exist."""
 
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
+import re
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,9 +44,7 @@ def test_imports_run_one_way(package: str) -> None:
 @pytest.mark.parametrize("package", ["posse", "posse_baselines"])
 def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
     code = f"import sys, {package}; print(*sorted(set(sys.modules) & {LEARNING!r}))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == []
+    assert printed("-c", code).split() == []
 
 
 # A room imports only rooms before it.
@@ -93,3 +91,18 @@ def test_other_packages_import_only_the_public_names_of_these_rooms(package: str
         if module.startswith(INTERNAL)
     ]
     assert wrong == []
+
+
+def test_every_promise_names_tests_that_exist() -> None:
+    page = (ROOT / "docs" / "reliability.md").read_text(encoding="utf-8")
+    promised = page.partition("## Not promised")[0]
+    for path, name in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", promised):
+        found = {
+            node.name
+            for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+            if isinstance(node, ast.FunctionDef)
+        }
+        assert not name or name in found, f"{path}::{name}"
+    rows = [line for line in promised.splitlines() if line.startswith("| ")][2:]
+    assert len(rows) >= 6
+    assert [row for row in rows if "`tests/" not in row] == []

@@ -23,7 +23,6 @@ from posse_baselines import (
 )
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.policies.simple import Random
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if not load(name).reads_state]
@@ -181,21 +180,6 @@ def test_what_cannot_be_recorded_is_named() -> None:
         rollout(posse.batch("constant", 1, autoreset="same_step"), load("idle"), ["tracker_x"])
     with pytest.raises(ValueError, match="steps=0 must be"):
         rollout(posse.batch("constant", 1), load("idle"), steps=0)
-
-
-def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
-    batch = posse.batch("constant", 200)
-    _, done = trace(Random(seed=1), batch, 10)
-    draws = np.stack(done)
-    assert draws.min() >= -1.0
-    assert draws.max() < 1.0
-    assert abs(draws.mean()) < 0.02
-    assert abs(draws.std() - 3**-0.5) < 0.02
-    assert len(np.unique(draws)) > 0.98 * draws.size
-    other = Random(seed=2)
-    assert not np.array_equal(other.act(batch.reset(seed=0), begin(other, batch))[0], done[0])
-    with pytest.raises(ValueError, match="seed=-1"):
-        Random(seed=-1)
 
 
 # --- refusals ------------------------------------------------------------------------------------

@@ -7,9 +7,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from tests.support.adapters import out_of_band, same
+from tests.support.adapters import same
 
 import posse
 from posse_baselines import PolicyError, begin, load
@@ -34,16 +33,6 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
         assert info["score"] == pytest.approx(float(infos["score"][0]))
     assert truncated
     assert info["metrics/score"] == pytest.approx(float(infos["metrics/score"][0]))
-
-
-def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
-    env = TrackerEnv("smart", seed=5, **SHORT)
-    env.reset()
-    twin = out_of_band(env)
-    for _ in range(5):
-        action = env.action_space.sample()
-        assert same(env.step(action), twin.step(action))
-    assert same(env.reset(seed=1), twin.reset(seed=1))
 
 
 def vector(**settings: Any) -> Any:
@@ -104,22 +93,3 @@ def test_many_worlds_agree_with_gymnasiums_own_vector_of_single_ones(
             options = {"reset_mask": ended}
             assert same(ours.reset(options=options), theirs.reset(options={"reset_mask": ended.copy()}))
     assert ends >= 2 * E
-
-
-def test_a_refused_step_changes_nothing() -> None:
-    one, other = (vector(seed=3, **SETTINGS) for _ in range(2))
-    with pytest.raises(ResetNeeded):
-        one.step(np.zeros((E, 2), np.float32))
-    assert same(one.reset(), other.reset())
-    for bad in (np.full((E, 2), 3.0), np.full((E, 2), np.nan), np.zeros((E, 3)), "left"):
-        with pytest.raises(ValueError, match="action"):
-            one.step(bad)
-    actions = np.full((E, 2), 0.5, np.float32)
-    for _ in range(5):
-        assert same(one.step(actions), other.step(actions))
-    env = TrackerEnv("constant", teammates="idle")
-    with pytest.raises(ResetNeeded):
-        env.step(np.zeros(2, np.float32))
-    env.reset(seed=1)
-    with pytest.raises(ValueError, match=r"actions\[0, 0, 0\] = nan"):
-        env.step(np.array([np.nan, 0], np.float32))

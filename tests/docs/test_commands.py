@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from tests.support.pages import PAGES, ROOT, blocks, named, script_of
+from tests.support.process import printed
 
 from posse_training.cli import COMMANDS
 
@@ -69,16 +68,7 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
         if not python.exists():
             pytest.skip("needs Ray: make recipes")
     (tmp_path / "page.py").write_text(script, encoding="utf-8")
-    paths = [str(tmp_path), str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
-    done = subprocess.run(
-        [str(python), "page.py"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=900,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy", "BROWSER": "true"},
-    )
-    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-3000:]
+    printed("page.py", program=python, cwd=tmp_path, seconds=900, SDL_VIDEODRIVER="dummy", BROWSER="true")
 
 
 @pytest.mark.parametrize("part", NOT_RUN)
@@ -92,7 +82,7 @@ def help_of(command: str) -> str:
     if command not in COMMANDS:
         return ""
     code = f"from posse_training.cli import main; main([{command!r}, '--help'])"
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stdout
+    return printed("-c", code)
 
 
 @pytest.mark.parametrize("page", [page for page in sorted(PAGES) if named(page)])

@@ -36,13 +36,6 @@ def test_one_observation_plays_each_tracker() -> None:
             np.testing.assert_allclose(actions[e, i], expected, rtol=1e-5, atol=1e-5)
 
 
-def test_a_model_of_the_team_plays_the_team() -> None:
-    model = PPO("MlpPolicy", gymnasium.make("posse/Team-v0"), device="cpu")
-    observations, actions = acted(from_sb3(model))
-    expected = [model.predict(each, deterministic=True)[0] for each in observations]
-    np.testing.assert_allclose(actions, expected, rtol=1e-5, atol=1e-5)
-
-
 def test_discrete_actions_and_silence() -> None:
     env = gymnasium.make("posse/Tracker-v0", discrete_actions=True)
     model = DQN("MlpPolicy", env, device="cpu", buffer_size=10)

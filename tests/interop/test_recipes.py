@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
@@ -44,18 +43,9 @@ LONGER = {"onnx_policy": 20, "robotarium": 50}
 
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
-    paths = [str(RECIPES), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
-    done = subprocess.run(
-        [str(python), "-W", "ignore", str(RECIPES / f"{name}.py"), *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy"},
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+    recipe = RECIPES / f"{name}.py"
+    variables = {"SDL_VIDEODRIVER": "dummy"}
+    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300, **variables)
 
 
 def names() -> list[str]:

@@ -95,8 +95,7 @@ def test_the_tests_of_the_sdist_run_from_its_own_tree(built: Path, tmp_path: Pat
     path = os.pathsep.join(str(tree / root) for root in ("envs", "baselines", "training"))
     pytest_ = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
     run(*pytest_, "--collect-only", cwd=tree, PYTHONPATH=path)
-    quick = ("tests/test_imports.py", "tests/test_reliability_page.py")
-    run(*pytest_, *quick, cwd=tree, PYTHONPATH=path)
+    run(*pytest_, "tests/test_imports.py", cwd=tree, PYTHONPATH=path)
 
 
 def readme(kind: str) -> list[str]:

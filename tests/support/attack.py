@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 import posse
+import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 
 SHORT: dict[str, Any] = {"num_trackers": 2, "horizon": 4, "settle_time": 0.1}
 LONG_NAME = "x" * 5000
@@ -31,6 +32,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "parallel": lambda: posse.parallel_env(**SHORT),
     "team": lambda: gymnasium.make(TEAM, disable_env_checker=True, **SHORT).unwrapped,
     "solo": lambda: gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped,
+    "tracker": lambda: gymnasium.make("posse/Tracker-v0", disable_env_checker=True, **SHORT).unwrapped,
     "team vector": lambda: _vector(TEAM),
     "solo vector": lambda: _vector(SOLO),
     "torchrl": _torchrl,
@@ -69,7 +71,7 @@ class Subject:
 
             carried = self.env.fake_tensordict().exclude("next")
             return carried.set(("agents", "action"), torch.from_numpy(actions))
-        shape: dict[str, Any] = {"team": actions[0], "solo": actions[0, 0]}
+        shape: dict[str, Any] = {"team": actions[0], "solo": actions[0, 0], "tracker": actions[0, 0]}
         return shape.get(self.kind, actions[:, 0] if self.kind == "solo vector" else actions)
 
     def bad_actions(self) -> Iterator[Any]:
@@ -97,12 +99,12 @@ class Subject:
         batch, env = self.batch, self.env
         kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}]
         kept.append([batch.seed, batch._started, batch._over])
-        if self.kind in ("parallel", "team", "solo"):
+        if self.kind in ("parallel", "team", "solo", "tracker"):
             world = env.unwrapped
             kept.append(world._seeded)
         if self.kind in ("team vector", "solo vector"):
             kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
-        if self.kind in ("team", "solo"):
+        if self.kind in ("team", "solo", "tracker"):
             kept.append(repr(env.np_random.bit_generator.state))
         if self.kind == "parallel":
             kept.append(list(env.agents))

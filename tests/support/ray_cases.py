@@ -1,11 +1,10 @@
-"""What only a Ray cluster can show; run by ``tests/training/cluster/test_ray.py`` where Ray is."""
+"""What only a Ray cluster can show; run by ``tests/training/cluster/test_cluster.py`` where Ray is."""
 
 from __future__ import annotations
 
 import filecmp
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -135,20 +134,3 @@ def test_seeds_are_trained_to_the_same_weights(nodes: Cluster, folder: Path) -> 
         assert main([*command.split(), "--out", name, *more]) == 0
     here, there = (load_file(folder / name / "seed-1" / "last.safetensors") for name in ("here", "there"))
     assert_equal(here, there)
-
-
-def test_a_node_that_dies_costs_its_shards(nodes: Cluster, local: Results, folder: Path) -> None:
-    """The last test: it leaves one worker."""
-
-    def remove() -> None:
-        while not (folder / "chosen").exists() or not (folder / "chosen").read_text():
-            time.sleep(0.05)
-        (node,) = [n for n in nodes.worker_nodes if n.node_id == (folder / "chosen").read_text()]
-        nodes.remove_node(node, allow_graceful=False)
-        (folder / "go").touch()
-
-    thread = threading.Thread(target=remove)
-    thread.start()
-    assert_equal(evaluate(Watched(folder, "wait"), "smart", EPISODES, **THERE).columns, local.columns)
-    thread.join()
-    assert begun(folder) >= SHARDS + 1

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.support.process import python
 
 EXTRA = (
     "torch",
@@ -34,9 +34,7 @@ sys.meta_path.insert(0, Blocker())
 
 def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run code in a process in which no package of an extra can be imported."""
-    return subprocess.run(
-        [sys.executable, "-c", f"{BLOCKED}\n{code}", *arguments], capture_output=True, text=True, check=False, cwd=cwd
-    )
+    return python("-c", f"{BLOCKED}\n{code}", *arguments, cwd=cwd)
 
 
 MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"

@@ -8,7 +8,7 @@ import pytest
 import posse
 from posse_baselines import Trajectory
 from posse_training.reproduce.reproduce import MEMBERS, MODELS, Settings, reproduce
-from posse_training.reproduce.runs import Floats, draw_starts, median_world, settling_times
+from posse_training.reproduce.runs import Floats, draw_starts, settling_times
 
 
 def run_with(relative: Floats, speeds: Floats) -> Trajectory:
@@ -50,12 +50,6 @@ def test_starts_are_the_figures() -> None:
     np.testing.assert_array_equal(targets[:, 2], np.pi)
     few, _ = draw_starts(scenario, 5, seed=3)
     np.testing.assert_array_equal(few, trackers[:5])
-
-
-def test_the_shown_run_is_the_median_one() -> None:
-    assert median_world(np.array([3.0, np.nan, 1.0, 2.0, 9.0])) == 3
-    assert median_world(np.array([4.0, 1.0])) == 1
-    assert median_world(np.array([np.nan, np.nan])) == 0
 
 
 @pytest.mark.long

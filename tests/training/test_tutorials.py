@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import runpy
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.numpy import load_file
+from tests.support.process import printed
 
 import posse
 from posse_baselines import load
@@ -73,15 +72,8 @@ def test_add_scenario(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 
 
 def test_reward_term() -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(TUTORIALS / "reward_term.py"), "--steps", "5"],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    lines = re.findall(rf"(\w+): steady (\d), reward {NUMBER} = {NUMBER}", done.stdout)
+    text = printed("-W", "error", TUTORIALS / "reward_term.py", "--steps", "5", NUMBA_DISABLE_JIT="1")
+    lines = re.findall(rf"(\w+): steady (\d), reward {NUMBER} = {NUMBER}", text)
     assert [steady for _, steady, *_ in lines] == ["1", "0", "0", "0", "0"]
     assert all(reward == expected for *_, reward, expected in lines)
     assert float(lines[0][2]) == pytest.approx(0.1, abs=0.005)
@@ -119,7 +111,7 @@ def test_cleanrl_ppo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_every_tutorial_is_tried_and_has_its_place_in_the_manual() -> None:
     tests = Path(__file__).read_text()
     page = (ROOT / "docs" / "tutorials" / "index.md").read_text()
-    elsewhere = {"notebook.ipynb", "step_loop.py"}  # tests/docs/test_notebook.py
+    elsewhere = {"notebook.ipynb", "step_loop.py"}  # tests/docs/test_pages.py
     names = {path.name for path in TUTORIALS.iterdir() if path.suffix != ".md"}
     files = sorted(names - elsewhere)
     assert len(files) == 6

@@ -11,7 +11,6 @@ import pytest
 
 from posse.rendering.canvas import Window
 from posse_training.cli import main
-from posse_training.play import steer
 from posse_training.replay import read_replay
 
 At = Callable[[Mapping[int, str]], list[str]]
@@ -104,9 +103,3 @@ def test_the_arrows_drive_a_robot_and_the_last_round_is_recorded(
     speed, turn = player.columns["action"].values[:, row, :2].astype(float)[:6].T
     assert turn.tolist() == pytest.approx([0, 0, 1, -1, 0, 0], abs=1e-3)
     assert speed.tolist() == pytest.approx([1, 1, 0.8, 0.8, 0.8, 0.8], abs=1e-3)
-
-
-def test_steering() -> None:
-    assert steer(0.0, {"up", "left"}, 0.1) == pytest.approx((0.2, 1.0))
-    assert steer(-0.9, {"down", "right"}, 0.1) == (-1.0, -1.0)
-    assert steer(0.5, (), 10.0) == (0.5, 0.0)

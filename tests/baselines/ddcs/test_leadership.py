@@ -66,15 +66,6 @@ def test_a_broken_leader_is_followed_by_the_nearest_that_works() -> None:
     assert (agree(now) & (waited == 0)).all()
 
 
-def test_without_exchange_the_first_leader_stays() -> None:
-    first = None
-    for now in drive("ddcs-centralized-no-exchange", "leader-loss", 10, 299, horizon=300):
-        first = now.notes["leader"].copy() if first is None else first
-        np.testing.assert_array_equal(now.notes["leader"], first)
-    assert now.broken.any()
-    assert (now.notes["exchanges"] == 0).all()
-
-
 # --- rule ii: who sees no other robot leads itself -----------------------------------------------
 
 

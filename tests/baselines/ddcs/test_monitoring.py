@@ -1,14 +1,20 @@
-"""Monitoring: the estimate of the target, and received messages."""
+"""Monitoring, the belief that a network reads, and detours."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import posse
 from posse_baselines import begin, load
+from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
+from posse_baselines.ddcs.actuation import turn_past
+from posse_baselines.ddcs.belief import BELIEF_SIZE, LOOKS_AT, MATES_AT, SEARCH_AT, SLOT_AT, TARGET_AT, TASK_AT
+from posse_baselines.laws.safeguard import DISC, put_disc
 
 
 @pytest.mark.parametrize(
@@ -59,3 +65,101 @@ def test_without_radio_nothing_heard_has_an_effect() -> None:
         without, deaf = policy.act(alone, deaf)
         np.testing.assert_array_equal(actions, without)
         observations, *_ = batch.step(actions)
+
+
+Complexes = npt.NDArray[np.complex128]
+
+
+def way(belief: npt.NDArray[np.float32], at: int, scale: float) -> Complexes:
+    """The vector (m) that stands at a place of beliefs with its length as d / (d + scale)."""
+    soft = belief[..., at] + 1j * belief[..., at + 1]
+    return np.asarray(soft * scale / (1.0 - np.abs(soft)))
+
+
+def test_a_team_in_formation_believes_what_is_so() -> None:
+    ddcs = DDCS()
+    batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
+    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
+    for _ in range(250):
+        proposals, memory = ddcs.propose(observations, memory, believes=True)
+        belief, state = proposals[..., 2:], {k: v.copy() for k, v in batch.state.items()}
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
+        observations = batch.step(actions)[0]
+    assert belief.shape == (8, 5, BELIEF_SIZE)
+    x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
+    ahead = {who: state[f"{who}_heading_cos"] + 1j * state[f"{who}_heading_sin"] for who in x}
+    to_target = (x["world"][:, None] - x["tracker"]) / ahead["tracker"]
+    assert (belief[..., TARGET_AT] == 1.0).all()
+    np.testing.assert_allclose(way(belief, TARGET_AT + 1, 3.0), to_target, rtol=0, atol=0.02)
+    velocity = belief[..., TARGET_AT + 3] + 1j * belief[..., TARGET_AT + 4]
+    moving = batch.scenario.target_speed * ahead["world"][:, None] / ahead["tracker"]
+    np.testing.assert_allclose(velocity, moving, rtol=0, atol=0.05)
+    np.testing.assert_array_equal(belief[..., TASK_AT : TASK_AT + 4].sum(-1), 1.0)
+    assert (belief[..., TASK_AT + FLOCKING] == 1.0).mean() > 0.9
+    flocking = belief[..., TASK_AT + FLOCKING] == 1.0
+    assert (np.abs(way(belief, SLOT_AT + 1, 0.3))[flocking] < 0.6).all()
+    assert not belief[..., SEARCH_AT : SEARCH_AT + 3].any()
+    np.testing.assert_array_equal(belief[..., MATES_AT], 1.0)
+    to_mates = (x["tracker"][:, None, :] - x["tracker"][:, :, None]) / ahead["tracker"][..., None]
+    nearest = np.sort(np.abs(to_mates), axis=-1)[..., 1]
+    np.testing.assert_allclose(np.abs(way(belief, MATES_AT + 1, 1.0)), nearest, rtol=0, atol=0.05)
+    assert ((belief[..., LOOKS_AT:] >= 0.0) & (belief[..., LOOKS_AT:] <= 1.0)).all()
+
+
+def test_who_searches_believes_nothing_of_the_target() -> None:
+    ddcs = DDCS()
+    batch = posse.batch("search", 8, message_size=ddcs.message_size)
+    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
+    lost = []
+    for _ in range(20):
+        proposals, memory = ddcs.propose(observations, memory, believes=True)
+        belief = proposals[..., 2:]
+        searching = belief[..., TASK_AT + SEARCHING] == 1.0
+        assert searching.any()
+        assert not belief[searching][:, TARGET_AT : TARGET_AT + 9].any()
+        assert not belief[searching][:, SLOT_AT : SLOT_AT + 7].any()
+        lost.append(belief[searching][:, SEARCH_AT].max())
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
+        observations = batch.step(actions)[0]
+    np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)
+
+
+CLEARANCE = 0.2
+
+
+def turn(discs: list[tuple[float, float, float]], side: float, speed: float = 0.0) -> float:
+    """The turn of a robot that heads along the x-axis, past discs (x, y, reach)."""
+    records, count = np.zeros(8, DISC), 0
+    for x, y, reach in discs:
+        count = put_disc(records, count, complex(x, y), complex(speed), reach, 0.1)
+    return float(turn_past(records[:count], CLEARANCE, 1 + 0j, side))
+
+
+@pytest.mark.parametrize("y", [-0.3, 0.0, 0.5])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_way_past_a_disc_is_its_tangent(y: float, side: float) -> None:
+    x, reach = 1.7, 0.6
+    angle = turn([(x, y, reach)], side)
+    assert angle == pytest.approx(math.atan2(y, x) + side * math.asin((reach + CLEARANCE) / math.hypot(x, y)))
+    # The line in that direction passes the centre at the clearance.
+    miss = x * math.sin(angle) - y * math.cos(angle)
+    assert side * miss == pytest.approx(reach + CLEARANCE)
+
+
+def test_what_is_not_in_the_way_is_passed_straight() -> None:
+    assert turn([(1.0, 0.9, 0.6), (-0.5, 0.0, 0.4)], 1.0) == 0.0  # beside and behind
+    assert turn([(1.0, 0.0, 0.6)], 1.0, speed=0.1) == 0.0  # it moves: left to the safeguard
+    assert turn([(1001.0, 0.0, 1000.0)], 1.0) == 0.0  # a wall
+
+
+def test_the_way_past_a_row_is_past_its_end() -> None:
+    row = [(1.5, 0.0, 0.6), (1.5, 0.9, 0.6)]
+    left, right = turn(row, 1.0), turn(row, -1.0)
+    assert left == pytest.approx(math.atan2(0.9, 1.5) + math.asin(0.8 / math.hypot(0.9, 1.5)))
+    assert right == pytest.approx(-math.asin(0.8 / 1.5))
+
+
+def test_enclosed_there_is_no_way() -> None:
+    ring = [(math.cos(a), math.sin(a), 0.6) for a in np.arange(8) * math.pi / 4]
+    assert abs(turn(ring, 1.0)) > 2.0
+    assert abs(turn(ring, -1.0)) > 2.0

@@ -1,14 +1,15 @@
-"""Slots are assigned for all formations, team sizes and radios."""
+"""The whole team at play: it takes its slots, searches, keeps off obstacles, bears late commands and drift."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import posse
-from posse_baselines import load, play
+from posse_baselines import DDCS, load, play
 from posse_baselines.ddcs.baseline import FAMILY
 
 
@@ -58,3 +59,33 @@ def test_obstacles_are_kept_off() -> None:
     metrics = play(batch, load("ddcs-distributed"))
     assert (metrics["obstacle_contacts"] == 0).mean() >= 0.95
     assert (metrics["tracker_contacts"] == 0).mean() >= 0.95
+
+
+def detection(scenario: str, arena: Any = 20.0, **settings: Any) -> npt.NDArray[np.float64]:
+    batch = posse.batch(scenario, 80, seed=4, split="train", message_size=5, horizon=300, arena=arena)
+    times = play(batch, DDCS.of("ddcs-distributed").with_settings(**settings))["detection_time"]
+    return np.where(np.isnan(times), 30.0, times)
+
+
+def test_a_rectangle_is_searched_as_fast_as_a_square_of_its_area() -> None:
+    square, rectangle = (detection("search", arena) for arena in (20.0, (28.0, 14.0)))
+    assert rectangle.max() < 30.0, "found in every world"
+    assert rectangle.mean() < square.mean() + 1.0
+
+
+@pytest.mark.parametrize("name", ["pngl-l-phi", "ddcs-distributed"])
+def test_late_commands_cost_the_team_little(name: str) -> None:
+    policy = load(name)
+    late = posse.get_scenario("constant", actuator_lag=0.5, command_delay=3)
+    metrics = play(posse.batch(late, 60, split="train", message_size=policy.message_size), policy)
+    assert metrics["safe_score"].mean() >= 0.75
+    assert (metrics["contact_free"] == 0).mean() <= 0.02
+
+
+def test_drifting_poses_cost_the_baseline_hardly_anything() -> None:
+    policy = load("pngl-l-phi")
+    drifting = posse.get_scenario("constant", odometry_drift=0.05, heading_drift=0.01)
+    batch = posse.batch(drifting, 60, split="train", message_size=policy.message_size)
+    metrics = play(batch, policy)
+    assert metrics["safe_score"].mean() >= 0.75
+    assert (metrics["contact_free"] == 0).mean() <= 0.02

@@ -1,15 +1,79 @@
-"""Features agree with the state of the world."""
+"""What networks read and answer: encodings by name, features of the state, and the numbers that come out."""
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.learned import observations_of
+from tests.support.learned import network_for, observations_of, policy_for
 
 import posse
-from posse_baselines.learned import Encoder, Encoding
+from posse.numeric import FloatArray
+from posse_baselines import PolicyError
+from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
+
+
+def test_names_are_those_of_views() -> None:
+    batch, observations = observations_of("radio")
+    encoding = Encoding.of(batch.layout, neighbours=3)
+    views, columns = batch.layout.views(observations), encoding.columns(batch.layout)[0]
+    for name, column in zip(encoding.names(), columns, strict=True):
+        field, _, at = name.rstrip("]").partition("[")
+        index = tuple(int(i) for i in at.split(", ") if i)
+        np.testing.assert_array_equal(views[field][(..., *index)], observations[..., column])
+
+
+def test_another_sonar_is_refused_by_name() -> None:
+    policy = policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
+    other = posse.ObservationLayout(posse.get_scenario("smart", sonar_beams=16))
+    with pytest.raises(PolicyError, match="sonar"):
+        policy.begin(other, 1)
+
+
+def test_a_policy_that_speaks_needs_messages() -> None:
+    layout = posse.ObservationLayout(posse.get_scenario("smart", message_size=3))
+    policy = LearnedPolicy(network_for(Encoding.of(layout).size, 5), Encoding.of(layout), {"name": "talker"})
+    assert policy.message_size == 3
+    with pytest.raises(PolicyError, match="message_size"):
+        policy.begin(posse.ObservationLayout(posse.get_scenario("smart")), 1)
+
+
+def test_longer_messages_than_it_uses_change_nothing() -> None:
+    small, observations = observations_of("smart", steps=0)
+    policy = policy_for(small.layout)
+    large, more = observations_of("smart", steps=0, message_size=2)
+    mine, _ = policy.act(observations, policy.begin(small.layout, 6))
+    theirs, _ = policy.act(more, policy.begin(large.layout, 6))
+    np.testing.assert_array_equal(theirs[:, :, :2], mine)
+    assert not theirs[:, :, 2:].any()
+
+
+def test_places_that_a_small_team_lacks_are_unknown() -> None:
+    full = posse.ObservationLayout(posse.get_scenario("smart"))
+    batch = posse.batch("smart", 1, num_trackers=2)
+    rows = Encoder(Encoding.of(full), batch.layout).encode(batch.reset())
+    named = full.views(rows)
+    np.testing.assert_array_equal(named["neighbour_range"][:, 1:], -1)
+    np.testing.assert_array_equal(named["neighbour_bearing"][:, 1:], 0)
+    assert (named["neighbour_range"][:, 0] > 0).all()
+
+
+def test_fewer_places_keep_the_nearest() -> None:
+    batch = posse.batch("smart", 2)
+    observations = batch.reset()
+    rows = Encoder(Encoding.of(batch.layout, neighbours=2), batch.layout).encode(observations)
+    np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
+
+
+def test_unknown_kinds() -> None:
+    layout = posse.ObservationLayout(posse.get_scenario("smart"))
+    with pytest.raises(PolicyError, match="plain, slots"):
+        Encoding.of(layout, "fancy")
+    with pytest.raises(PolicyError, match="neighbours=-1"):
+        Encoding.of(layout, neighbours=-1)
 
 
 def test_own_slot_is_where_the_state_says() -> None:
@@ -59,3 +123,27 @@ def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> N
                 other = chosen.astype(int)
                 other[[i, j]] = other[[j, i]]
                 assert ways[np.arange(robots), other].sum() >= total - 1e-3
+
+
+def in_double_precision(network: Network, rows: FloatArray) -> npt.NDArray[np.float64]:
+    """The actions for encoded observations, by matrix products."""
+    x = np.clip((rows - network.mean) * network.scale, -network.limit, network.limit).astype(np.float64)
+    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True), 1):
+        x = x @ weight.T.astype(np.float64) + bias
+        if layer < len(network.weights):
+            x = np.tanh(x) if network.activation == "tanh" else np.maximum(x, 0)
+    return np.asarray(np.tanh(x) if network.output == "tanh" else np.clip(x, -1, 1))
+
+
+@pytest.mark.parametrize("kind", ["plain", "slots"])
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+@pytest.mark.parametrize("output", ["clip", "tanh"])
+def test_actions_are_the_networks_output(kind: str, activation: str, output: str) -> None:
+    batch, observations = observations_of("field")
+    policy = policy_for(batch.layout, kind, activation=activation, output=output)
+    actions, _ = policy.act(observations, policy.begin(batch.layout, 6))
+    rows = Encoder(policy.encoding, batch.layout).encode(observations)
+    expected = in_double_precision(policy.network, rows).reshape(actions.shape)
+    np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
+    assert np.abs(actions).max() <= 1
+    assert np.ptp(actions) > 0.5  # the networks say something

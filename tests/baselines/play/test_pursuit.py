@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from tests.support.drive import Floats, Instant, complex_of, drive
 
 from posse_baselines import DDCS, Policy, load
-from posse_baselines.ddcs import CONVERGING, FLOCKING
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
 RATIOS = (1.2, 1.5, 2.0, 3.0)
@@ -107,33 +106,6 @@ def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> N
     np.testing.assert_allclose(radii, 1.6, rtol=0.005)
     speeds = [now.commands[0, 0, 0] for now in last]
     np.testing.assert_allclose(speeds, 0.6 * 1.6 / 2.0, rtol=0.005)
-
-
-def test_chase_and_maintenance_change_with_hysteresis() -> None:
-    # One that comes from afar chases until it is 0.15 m too far; one in place that has to turn
-    # round first is left behind by up to 0.8 m, and does not chase.
-    between: list[set[int]] = []
-    for pose in ((-2.4, 0.0, 0.0), (-1.2, 0.0, 2.5)):
-        tasks = set()
-        for now in drive(
-            "velocity-pursuit",
-            "constant",
-            1,
-            60,
-            num_trackers=1,
-            target_speed=0.5,
-            tracker_pose=[pose],
-            target_pose=(0.0, 0.0, 0.0),
-        ):
-            excess, task = abs(now.line_of_sight[0, 0]) - 1.2, int(now.notes["task"][0, 0])
-            if excess < 0.15:
-                assert task == FLOCKING
-            elif excess > 0.8:
-                assert task == CONVERGING
-            elif 0.2 < excess < 0.75:
-                tasks.add(task)
-        between.append(tasks)
-    assert between == [{CONVERGING}, {FLOCKING}]
 
 
 @pytest.mark.parametrize("theta", [math.pi, 0.5, -2.0])

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import pickle
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from gymnasium.error import ResetNeeded
 from tests.support.adapters import out_of_band, part
+from tests.support.process import printed
 from tests.support.reference.state import snapshot
 
 import posse
@@ -150,14 +148,8 @@ np.savez(sys.argv[3], *here(sys.argv[1], int(sys.argv[2])))
 
 
 def in_another_process(tmp_path: Path, name: str, steps: int, **environment: str) -> list[npt.NDArray[Any]]:
-    root = Path(__file__).parents[3]
-    paths = [str(root), str(root / "envs"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     out = tmp_path / "out.npz"
-    subprocess.run(
-        [sys.executable, "-W", "error", "-c", IN_ANOTHER_PROCESS, name, str(steps), str(out)],
-        env={**os.environ, **environment, "PYTHONPATH": os.pathsep.join(paths)},
-        check=True,
-    )
+    printed("-W", "error", "-c", IN_ANOTHER_PROCESS, name, str(steps), out, **environment)
     with np.load(out) as arrays:
         return [arrays[key] for key in arrays]
 

@@ -66,15 +66,6 @@ def test_copies_draw_what_neither_their_original_nor_other_copies_draw(name: str
         assert not np.array_equal(first[:, e], second[:, e])
 
 
-def test_copies_that_are_alike_draw_the_same() -> None:
-    batch = played("field")
-    copies = batch.copies(3, alike=True)
-    for step in range(30):
-        seen = copies.step(actions_for(batch, step, 3))[0]
-    np.testing.assert_array_equal(seen, np.repeat(seen[::3], 3, axis=0))
-    assert not gone_on(batch, copies, 3)
-
-
 def test_what_copies_draw_follows_from_seed_and_step() -> None:
     def future(seed: int, steps: int = 40, into: posse.Batch | None = None) -> NDArray[np.float32]:
         batch = played("field", steps=steps)

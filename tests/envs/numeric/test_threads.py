@@ -6,7 +6,6 @@ import gc
 import os
 import signal
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
@@ -96,12 +95,6 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
         gc.enable()
     assert interrupted == 100
     assert whole > 90
-
-
-def test_callers_at_once_are_served() -> None:
-    with ThreadPoolExecutor(8) as callers:
-        for call in [callers.submit(check) for _ in range(50)]:
-            call.result()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")

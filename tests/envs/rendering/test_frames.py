@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from gymnasium.error import ResetNeeded
+from tests.support.process import printed
 
 import posse
 from posse.rendering.renderer import Renderer
@@ -108,8 +107,7 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
         "b = posse.batch('constant'); b.reset();"
         "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "(640,", "640,", "3)", "False"]
+    assert printed("-c", code).split() == ["False", "(640,", "640,", "3)", "False"]
 
 
 def test_mistakes_are_named() -> None:

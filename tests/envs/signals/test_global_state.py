@@ -24,7 +24,7 @@ FOLLOWS: Final = (
     "tracker_touching_obstacles",
     "tracker_near",
     "tracker_onsets",  # counted again if anything is near, else 0
-    # from poses, the slot frame and contacts: who occupies which slot (test_score)
+    # from poses, the slot frame and contacts: who occupies which slot (test_random_worlds)
     "tracker_slot",
     "tracker_slot_distance",
     # from the scenario, always the same

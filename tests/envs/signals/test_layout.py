@@ -1,9 +1,12 @@
-"""The observation: fields against an independent computation, bounds, layout."""
+"""The observation: what the target is given, layout, and eight observers at once."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from tests.support.process import printed
 from tests.support.reference.senses import sonar
 from tests.support.reference.state import headings, one_world, positions, snapshot
 
@@ -62,32 +65,6 @@ def test_only_a_rectangle_has_a_height() -> None:
         wide.reset(options={"target_pose": (0.0, 8.0, 0.0)})
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, 8, 12, 13, 40, 64])
-@pytest.mark.parametrize("name", ["constant", "radio"])
-def test_one_to_sixty_four_trackers_nearest_first(name: str, number: int) -> None:
-    batch = posse.batch(name, 2, num_trackers=number, num_neighbours=5, start_distance=(2.0, 8.0))
-    twelve = posse.batch(name, 2, num_trackers=12, num_neighbours=5)
-    assert batch.layout.size == twelve.layout.size, "the layout does not depend on N"
-    batch.reset(seed=6)
-    for _ in range(5):
-        observations = batch.step(np.zeros(batch.action_shape))[0]
-    assert observations.shape == (2, number, batch.layout.size)
-    views = batch.layout.views(observations)
-    filled = views["neighbour_number"] >= 0
-    ranges = np.where(filled, views["neighbour_range"], np.inf)
-    assert (ranges[..., 1:] >= ranges[..., :-1]).all()
-    if name == "constant":
-        assert (filled.sum(axis=-1) == min(5, number - 1)).all()
-        place = positions(one_world(snapshot(batch), 0))[:number]
-        away = np.abs(place[:, None] - place[None, :]) + np.diag(np.full(number, np.inf))
-        for i in range(number):
-            nearest = np.sort(away[i])[: min(5, number - 1)]
-            np.testing.assert_allclose(ranges[0, i][filled[0, i]], nearest, rtol=1e-5, atol=1e-5)
-    assert (views["neighbour_age"][~filled] == -1).all()
-    assert (views["neighbour_range"][~filled] == -1).all()
-    assert (views["neighbour_bearing"][~filled] == 0).all()
-
-
 @pytest.mark.parametrize("name", posse.scenario_names())
 def test_views_share_memory_and_cover_the_observation(name: str) -> None:
     batch = posse.batch(name, 2, message_size=2)
@@ -104,7 +81,78 @@ def test_views_share_memory_and_cover_the_observation(name: str) -> None:
             np.testing.assert_array_equal(part.squeeze(-1) if field.size == 1 else part, views[field.name])
 
 
-def test_observations_of_another_length_are_refused() -> None:
-    layout = posse.batch().layout
-    with pytest.raises(ValueError, match="last axis"):
-        layout.views(np.zeros((2, layout.size + 1)))
+WORLDS: dict[str, dict[str, Any]] = {
+    "smart": {"num_trackers": 5, "num_neighbours": 7, "message_size": 1},
+    "smart, one": {"num_trackers": 1, "num_neighbours": 0},
+    "smart, eight": {"num_trackers": 8, "num_neighbours": 3, "sonar_beams": 5, "message_size": 2},
+    "smart, the target an agent": {"num_trackers": 9, "num_neighbours": 8, "target_motion": "agent"},
+    "smart, sixteen": {"num_trackers": 16, "num_neighbours": 15},
+    "smart, some of sixteen": {"num_trackers": 16, "num_neighbours": 9, "message_size": 1},
+    "smart, seventeen": {"num_trackers": 17, "num_neighbours": 16, "message_size": 1},
+    "smart, sixty-four": {"num_trackers": 64, "num_neighbours": 63},
+    "constant": {"field_of_view": 2.0, "sensing_range": 9.0},
+    "obstacles": {"autoreset": "same_step"},
+    "radio": {"message_size": 2},
+    "leader-loss": {"autoreset": "same_step", "break_window": (0.2, 0.5)},
+    "field": {"num_trackers": 3},
+    "robots": {"command_delay": 2, "odometry_drift": 0.05, "heading_drift": 0.02, "heading_noise": 0.05},
+}
+COUNT = 11  # eight together, and three each alone
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
+    scenario = world.partition(",")[0]
+    make: dict[str, Any] = {"horizon": 31, "num_threads": 1, "seed": 4, "settle_time": 1.0, **WORLDS[world]}
+    together = posse.batch(scenario, COUNT, **make)
+    alone = [posse.batch(scenario, 1, first_world=e, **make) for e in range(COUNT)]
+    rng = np.random.default_rng(0)
+    outputs, expected = [together.reset()], [np.concatenate([each.reset() for each in alone])]
+    for step in range(40):  # past the horizon, where worlds start anew
+        for mine, theirs in zip(outputs, expected, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
+        *outputs, infos = together.step(actions)
+        outputs.append(infos["score"])
+        each = [world.step(actions[e : e + 1]) for e, world in enumerate(alone)]
+        expected = [np.concatenate(parts) for parts in zip(*(step[:4] for step in each), strict=True)]
+        expected.append(np.concatenate([step[4]["score"] for step in each]))
+        if step == 12:  # some start anew, in their midst some that are only looked at
+            mask = rng.random(COUNT) < 0.5
+            outputs[0] = together.reset(options={"reset_mask": mask})
+            for e in np.flatnonzero(mask):
+                expected[0][e] = alone[e].reset()[0]
+
+
+LARGEST = """
+import posse, numpy
+team = dict(num_trackers=64, num_neighbours=63, start_distance=(4.0, 40.0), num_threads=1)
+place = dict(arena=100.0, num_obstacles=60, obstacle_gap=0.3, sonar_beams=64)
+for worlds, settings in (
+    (1, dict(team, **place, target_motion="agent")),
+    (1, dict(team, radio_range=30.0)),
+    (8, dict(team, num_trackers=16, num_neighbours=9)),
+):
+    batch = posse.batch("smart", worlds, **settings)
+    batch.reset(seed=1)
+    batch.step(numpy.ones(batch.action_shape))
+"""
+
+
+@pytest.mark.long
+def test_the_largest_worlds_fit_their_memory() -> None:
+    """Compiled code does not check array bounds; plain Python does."""
+    printed("-W", "ignore", "-c", LARGEST, NUMBA_DISABLE_JIT="1")
+
+
+@pytest.mark.parametrize("worlds", [1, 8])
+def test_of_mates_as_near_the_lower_number_comes_first(worlds: int) -> None:
+    batch = posse.batch("constant", worlds, num_trackers=5)
+    # Four at the corners of a square round the last, in no order, and nothing to round.
+    corners = [(4.0, -4.0, 0.0), (-4.0, 4.0, 0.0), (4.0, 4.0, 0.0), (-4.0, -4.0, 0.0)]
+    poses = np.array([*corners, (0.0, 0.0, 0.0)])
+    observed = batch.layout.views(batch.reset(seed=0, options={"tracker_pose": poses}))
+    numbers, ranges = observed["neighbour_number"], observed["neighbour_range"]
+    assert (ranges[:, 4] == ranges[:, 4, :1]).all()
+    orders = [[4, 2, 3, 1], [4, 2, 3, 0], [4, 0, 1, 3], [4, 0, 1, 2], [0, 1, 2, 3]]
+    np.testing.assert_array_equal(numbers, np.broadcast_to(orders, numbers.shape))

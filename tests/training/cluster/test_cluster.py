@@ -1,4 +1,4 @@
-"""Where a cluster is named, what its results depend on, and what needs none."""
+"""Where a cluster is named, what its results depend on, what needs none, and two nodes of Ray."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.support.process import printed
 
 from posse_baselines import from_function, load
 from posse_training import evaluate, provenance
@@ -71,3 +72,15 @@ def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest
 def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> None:
     with pytest.raises(ClusterError, match=r"has no folder .*elsewhere: train on a file system that all nodes share"):
         train_on_worker(TrainSettings(), tmp_path / "elsewhere")
+
+
+ROOT = Path(__file__).parents[3]
+ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
+
+
+@pytest.mark.long
+def test_on_a_cluster_of_two_nodes(tmp_path: Path) -> None:
+    if not ELSEWHERE.exists():
+        pytest.skip("Ray is not installed: make recipes")
+    words = f"-W ignore -m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {tmp_path / 'cases'}"
+    printed(*words.split(), "tests/support/ray_cases.py", program=ELSEWHERE, RAY_AUTH_MODE="disabled")

@@ -161,13 +161,6 @@ def test_a_folder_with_any_file_is_refused_before_anything_is_played(
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_without_a_folder_the_next_free_one_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    settings = Settings(("idle",), ("constant",), episodes=1, figures=False, planner_episodes=0)
-    assert [str(compare(settings).folder) for _ in range(2)] == ["runs/compare", "runs/compare-2"]
-    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["compare", "compare-2"]
-
-
 def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None:
     policies = ("a/b=idle", "a?b=idle", "A/B=pursuit")
     found = compare(Settings(policies, ("constant",), 1, out=tmp_path, figures=False, planner_episodes=0))

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.support.process import printed
 
 from posse_training import evaluate
 from posse_training.cli import main
@@ -77,17 +78,7 @@ raise SystemExit(main(["compare", *policies, "--scenario", "constant", "--episod
 
 def test_a_script_without_a_main_guard_may_compare(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(UNGUARDED)
-    sources = [ROOT / root for root in ("envs", "baselines", "training")]
-    done = subprocess.run(
-        [sys.executable, "script.py"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources))},
-    )
-    assert done.returncode == 0, done.stderr
+    printed("script.py", cwd=tmp_path)
     assert (tmp_path / "out").is_dir()
 
 

@@ -1,4 +1,4 @@
-"""The report of a comparison: one page that holds all estimates and figures, with replays beside it."""
+"""Figures of a comparison show its data; one page holds all estimates and figures, with replays beside it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from tests.support.learned import any_policy
 
 import posse
+from posse_training.compare import figures
 from posse_training.compare.compare import Comparison, Settings, compare
+from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
 from posse_training.compare.report import extremes
 from posse_training.evaluation.results import Results
 from posse_training.replay import read_replay
+from posse_training.style import BOUND, looks_of
 
 HOSTILE = "</script><script>alert(1)</script><img src onerror>'\"&lt;{{title}}<!--$x$]]>"
 
@@ -66,18 +71,13 @@ def test_replays_are_of_the_worlds_with_the_largest_differences(found: Compariso
         assert [player.metrics["safe_score"] for player in replay.players] == [one.baseline, one.mine]
 
 
-def plays_of(label: str, scenario: str, *seeds: list[float]) -> Plays:
-    settings = posse.get_scenario(scenario)
-    return Plays(label, tuple(Results(label, settings, 7, "test", {"safe_score": np.array(s)}) for s in seeds))
-
-
 def test_extremes_are_paired_by_world_and_not_all_of_one_policy() -> None:
     made = (
-        plays_of("base", "smart", [0.5, 0.5, 0.5]),
-        plays_of("mine", "smart", [0.6, 0.9, 0.8], [0.5, 0.1, 0.5]),
-        plays_of("other", "smart", [0.5, 0.6, 0.5]),
-        plays_of("planner", "smart", [1.0]),
-        plays_of("mine", "radio", [1.0]),
+        plays_of("base", "smart", safe_score=[0.5, 0.5, 0.5]),
+        plays_of("mine", "smart", safe_score=[[0.6, 0.9, 0.8], [0.5, 0.1, 0.5]]),
+        plays_of("other", "smart", safe_score=[0.5, 0.6, 0.5]),
+        plays_of("planner", "smart", safe_score=[1.0]),
+        plays_of("mine", "radio", safe_score=[1.0]),
     )
     plays = {(each.scenario.name, each.label): each for each in made}
     shown = extremes(plays, "base", 3)
@@ -89,3 +89,85 @@ def test_extremes_are_paired_by_world_and_not_all_of_one_policy() -> None:
     assert extremes(plays, "base", 0) == []
     few = {key: each for key, each in plays.items() if key[1] in ("base", "planner")}
     assert [w.policy for w in extremes(few, "base", 3)] == ["planner"]
+
+
+LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
+
+
+def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float]]) -> Plays:
+    given = {name: np.atleast_2d(values) for name, values in columns.items()}
+    seeds = len(next(iter(given.values())))
+    return Plays(
+        label,
+        tuple(
+            Results(
+                label,
+                posse.get_scenario(scenario),
+                7,
+                "test",
+                {name: np.asarray(values[k], np.float64) for name, values in given.items()},
+            )
+            for k in range(seeds)
+        ),
+    )
+
+
+def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
+    """The longest line that is drawn in a policy's colour and kind of line."""
+    style = LOOKS[policy]
+    found = [
+        drawn
+        for axis in figure.axes
+        for drawn in axis.lines
+        if drawn.get_color() == style.colour and len(np.atleast_1d(drawn.get_xdata())) > 2
+    ]
+    assert found, policy
+    longest = max(found, key=lambda drawn: len(np.atleast_1d(drawn.get_xdata())))
+    return list(np.asarray(longest.get_xdata())), list(np.asarray(longest.get_ydata()))
+
+
+def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
+    scores = [0.2, 0.4, 0.4, 0.9]
+    figure = figures.profile(
+        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}, LOOKS
+    )
+    x, y = line(figure, "pursuit")
+    at = dict(zip(np.round(x, 4), y, strict=True))
+    for score, expected in ((0.0, 1), (0.2, 1), (0.205, 0.75), (0.4, 0.75), (0.5, 0.25), (1, 0)):
+        assert at[score] == expected
+    _, bound = line(figure, BOUND)
+    assert set(bound) == {1.0}
+
+
+def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
+    """Teams that never recover count, and no team counts after the end of its episode."""
+    taken = [1.0, 2.0, np.nan, np.nan]
+    figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)], LOOKS)
+    x, y = line(figure, "pursuit")
+    at = dict(zip(np.round(x, 6), y, strict=True))
+    assert (at[0.9], at[1.0], at[1.9], at[2.0]) == (0, 0.25, 0.25, 0.5)
+    scenario = posse.get_scenario("leader-loss")
+    assert max(x) == pytest.approx(0.4 * scenario.duration - scenario.settle_time)
+    assert max(y) == 0.5
+
+
+def learned(curve: object) -> Contender:
+    card = {
+        "name": "mine",
+        "curve": curve,
+        "seed": 3,
+        "settings": {"evaluate_worlds": 64},
+        "scenarios": [posse.get_scenario("smart").to_dict()],
+    }
+    return Contender("mine", (any_policy().with_card(card),))
+
+
+def test_learning_curves_are_those_of_the_cards() -> None:
+    points = [{"steps": 1e6 * k, "safe_score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k} for k in (1, 2, 3)]
+    figure = figures.learning(figures.curves_of([learned(points), Contender("idle", ("idle",))]), LOOKS)
+    x, y = line(figure, "mine")
+    assert x == [1, 2, 3]
+    assert y == pytest.approx([0.2, 0.4, 0.6])
+    damaged: tuple[object, ...] = ([], points[:1], "none", [{"steps": 1}], [{**points[0], "low": float("nan")}] * 2)
+    for curve in damaged:
+        assert figures.curves_of([learned(curve)]) == []

@@ -1,3 +1,5 @@
+"""Evaluations of a policy on many worlds, and the intervals of their means."""
+
 import csv
 import json
 from pathlib import Path
@@ -5,12 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import posse
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 from posse_training import evaluate
+from posse_training.evaluation import statistics
 from posse_training.evaluation.episodes import ExchangeCounter
+from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
@@ -94,3 +99,94 @@ def test_only_a_policy_that_says_so_is_given_the_state(reads: bool) -> None:
     spy = Spy()
     evaluate(spy, "constant", 1, **FAST)
     assert spy.given is reads
+
+
+def test_the_interval_of_a_mean_agrees_with_the_normal_theory() -> None:
+    values = np.random.default_rng(1).normal(3.0, 2.0, 1000)
+    estimate = mean(values)
+    half = 1.96 * values.std(ddof=1) / np.sqrt(len(values))
+    assert estimate.value == pytest.approx(values.mean())
+    assert estimate.low == pytest.approx(values.mean() - half, abs=0.02)
+    assert estimate.high == pytest.approx(values.mean() + half, abs=0.02)
+
+
+def test_episodes_in_which_it_never_happened_do_not_count() -> None:
+    estimate = mean([1.0, np.nan, 3.0])
+    assert (estimate.value, estimate.count) == (2.0, 2)
+    assert mean([np.nan, np.nan]).count == 0
+
+
+def test_the_interquartile_mean_ignores_both_tails() -> None:
+    values = np.concatenate([np.full(50, 0.5), np.full(10, 1e6), np.full(10, -1e6)])
+    assert over_seeds(values, middle_mean).value == 0.5
+
+
+def test_a_share_has_wilsons_interval() -> None:
+    estimate = share([True] * 990 + [False] * 10)
+    z, n, p = stats.norm.ppf(0.975), 1000, 0.99
+    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    assert estimate.low == pytest.approx(centre - half)
+    assert estimate.high == pytest.approx(centre + half)
+    assert share([True] * 20).high == 1.0
+
+
+class TestTrainingSeeds:
+    @staticmethod
+    def draw(
+        rng: np.random.Generator, seeds: int, worlds: int, of_seed: float, of_world: float
+    ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        """Scores with an effect of the seed, one of the world, and one of both together."""
+        return np.asarray(
+            of_seed * rng.normal(size=(seeds, 1))
+            + of_world * rng.normal(size=(1, worlds))
+            + 0.1 * rng.normal(size=(seeds, worlds))
+        )
+
+    def test_the_interval_is_as_wide_as_the_analysis_of_variance_says(self) -> None:
+        seeds, worlds = 12, 150
+        values = self.draw(np.random.default_rng(5), seeds, worlds, 0.3, 1.0)
+        # Two crossed random effects: the mean squares of rows, columns and rest (Searle).
+        rows, columns = values.mean(axis=1), values.mean(axis=0)
+        rest = values - rows[:, None] - columns[None] + values.mean()
+        of_rest = (rest**2).sum() / ((seeds - 1) * (worlds - 1))
+        of_seeds, of_worlds = worlds * rows.var(ddof=1), seeds * columns.var(ddof=1)
+        deviation = np.sqrt((of_seeds + of_worlds - of_rest) / (seeds * worlds))
+        estimate = over_seeds(values)
+        assert estimate.value == pytest.approx(values.mean())
+        assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * deviation, rel=0.1)
+
+    def test_what_worlds_have_in_common_leaves_a_paired_difference(self) -> None:
+        rng = np.random.default_rng(7)
+        worlds = 10 * rng.normal(size=200)
+        trained = worlds + 0.5 + 0.05 * rng.normal(size=(5, 200))
+        paired = difference(trained, worlds)
+        assert paired.value == pytest.approx(0.5, abs=0.02)
+        assert paired.high - paired.low < 0.1
+        assert over_seeds(trained).high - over_seeds(trained).low > 1
+        turned = difference(worlds, trained)
+        assert turned.value == pytest.approx(-paired.value)
+        assert turned.low == pytest.approx(-paired.high, abs=0.02)
+
+    def test_improvement_compares_every_pair_of_seeds(self) -> None:
+        mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])
+        assert improvement(mine, theirs).value == pytest.approx((1 + 0 + 1 + 0.5 + 4 * 0.25) / 8)
+
+    @pytest.mark.long
+    def test_the_truth_is_in_as_often_as_is_said(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(statistics, "RESAMPLES", 300)
+        rng = np.random.default_rng(9)
+        for seeds, least, most in ((3, 0.72, 0.88), (10, 0.86, 0.97)):
+            inside = 0
+            for _ in range(150):
+                estimate = over_seeds(self.draw(rng, seeds, 20, 1.0, 0.0))
+                inside += estimate.low <= 0 <= estimate.high
+            assert least <= inside / 150 <= most
+
+    def test_worlds_that_do_not_match_are_refused(self) -> None:
+        with pytest.raises(ValueError, match="same worlds"):
+            difference(np.zeros((3, 5)), np.zeros(4))
+        with pytest.raises(ValueError, match="same worlds"):
+            improvement([1, 2], [1, 2, 3])
+        with pytest.raises(ValueError, match="numbers"):
+            over_seeds([[np.nan, 1.0]])

@@ -233,32 +233,6 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
         assert state(page, "position") == 4
 
 
-def test_on_a_phone(browser: Browser, written: Path) -> None:
-    with opened(browser, written, "#t=0", size=(390, 844), touch=True) as page:
-        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
-        assert wide[0] <= wide[1] == 390
-        boxes = [box.bounding_box() for box in page.locator("#views canvas").all()]
-        assert all(box and box["width"] > 380 and box["height"] > 150 for box in boxes)
-        for selector in ("#play", "#forth", "#speed", "#more", "#trails", "#help"):
-            box = page.locator(selector).bounding_box()
-            assert box is not None
-            assert box["x"] >= 0
-            assert box["x"] + box["width"] <= 390
-            assert box["y"] + box["height"] <= 844
-            assert box["height"] >= 30
-        assert not page.locator("#panel").is_visible()
-        page.tap("#more")
-        assert page.locator("#panel").is_visible()
-        page.wait_for_timeout(100)  # for the pictures to take their new places
-        place = page.evaluate("""() => {
-            const { columns } = window.replay.app.players[0];
-            return window.replay.look(0).project(
-                columns.get("tracker_x").at(0, 1), columns.get("tracker_y").at(0, 1));
-        }""")
-        page.locator("#views canvas").first.tap(position={"x": place[0], "y": place[1]})
-        assert state(page, "selected") == 1
-
-
 def test_a_hostile_page_runs_nothing_and_shows_the_text(browser: Browser, tmp_path: Path) -> None:
     path = write_replay(hostile(), tmp_path / "a.html")
     with opened(browser, path, "#t=0.3&r=1") as page:

@@ -121,23 +121,6 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     np.testing.assert_array_equal(dones.reshape(4, 5).all(axis=1), [True, False, False, False])
 
 
-def test_nothing_returned_is_overwritten_or_shared() -> None:
-    env = make(worlds=2, staggered=True)
-    kept: list[tuple[Any, ...]] = [(env.reset(),)]
-    copies = [tuple(array.copy() for array in kept[0])]
-    generator = np.random.default_rng(0)
-    for _ in range(2 * HORIZON):
-        observations, rewards, dones, infos = move(env, draw(env, generator))
-        assert len({id(info) for info in infos}) == env.num_envs
-        finals = [i["terminal_observation"] for i in infos if "terminal_observation" in i]
-        kept.append((observations, rewards, dones, *finals))
-        copies.append(tuple(array.copy() for array in kept[-1]))
-    for arrays, before in zip(kept, copies, strict=True):
-        for array, copy in zip(arrays, before, strict=True):
-            np.testing.assert_array_equal(array, copy)
-            assert array.base is None or array.base is not kept[0][0]
-
-
 def test_teams_of_several_sizes_and_scenarios() -> None:
     batches = [
         posse.batch("constant", 2, num_trackers=3, autoreset="disabled", horizon=50),

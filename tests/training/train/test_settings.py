@@ -30,19 +30,10 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
     [
         ({"steps": 0}, r"steps=0 must lie in \[1, 1000000000000\]"),
         ({"steps": 1.5}, "steps=1.5 must be a whole number"),
-        ({"steps": True}, "steps=True must be a whole number"),
-        ({"steps": "many"}, "steps='many' must be"),
-        ({"seed": 2**40}, "seed=1099511627776 must lie in"),
         ({"discount": 1.5}, r"discount=1.5 must lie in \[0, 1\]"),
-        ({"discount": "x"}, "discount='x' must be a number"),
         ({"learning_rate": float("nan")}, "learning_rate=nan"),
-        ({"log_deviation": 1e9}, "log_deviation="),
         ({"hidden": (0,)}, "hidden=.* is invalid: it must be whole numbers of at least 1"),
-        ({"hidden": 3}, "hidden=3"),
-        ({"team_sizes": (1.5,)}, "team_sizes="),
-        ({"num_neighbours": -1}, "num_neighbours=-1"),
         ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
-        ({"encoding": ["plain"]}, "encoding="),
         ({"safeguard": True, "advise": "ddcs-tuned"}, "safeguard=True goes with neither advise nor imitate"),
         ({"overrides": [1]}, r"overrides=\[1\]"),
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
@@ -78,26 +69,17 @@ def test_what_an_algorithm_cannot_do(tmp_path: Path, changes: dict[str, Any], me
 
 
 @pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("seed", str(2**40)),
-        ("seed", "-1"),
-        ("steps", str(10**30)),
-        ("beside", "nobody"),
-        ("imitate", "nobody"),
-        ("advise", "planner"),
-        ("beside", ":x"),
-        ("wandb", "project"),
-        ("scenario", "x" * 5000),
-    ],
+    "words",
+    f"seed -1;seed {2**40};steps {10**30};beside nobody;imitate nobody;advise planner;beside :x;wandb project".split(
+        ";"
+    ),
 )
 def test_nothing_is_made_before_settings_are_checked(
-    tmp_path: Path, option: str, value: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = [f"--{option}", value, "--out", str(tmp_path / "run")]
-    scenario = [] if option == "scenario" else ["--scenario", "constant"]
+    option, value = words.split()
     try:
-        status: Any = main(["train", *scenario, *arguments])
+        status: Any = main(["train", "--scenario", "constant", f"--{option}", value, "--out", str(tmp_path / "run")])
     except SystemExit as error:  # of the parser
         status = error.code
     shown = capsys.readouterr().err
@@ -115,7 +97,6 @@ def test_nothing_is_made_before_settings_are_checked(
         '{"steps": null}',
         '{"steps": NaN}',
         '{"hidden": {"a": 1}}',
-        '{"overrides": {"horizon": "x"}}',
         '{"reward_weights": {"slot": []}}',
     ],
 )

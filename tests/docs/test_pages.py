@@ -1,0 +1,102 @@
+"""What pages show: drawings of laws, the table of the README, the loop and the notebook, and the speed benchmark."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import runpy
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib as mpl
+import pytest
+from tests.support.process import printed
+
+import posse
+from posse_baselines import load, play, policy_names
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "policies.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def laws(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    monkeypatch.syspath_prepend(str(DOCS / "drawing"))
+    mpl.use("Agg")
+    yield importlib.import_module("laws")
+    for name in ("laws", "geometry"):
+        sys.modules.pop(name, None)
+
+
+def test_each_law_has_an_equation_and_a_picture(laws: ModuleType) -> None:
+    sections = re.split(r"^### ", PAGE, flags=re.MULTILINE)
+    for law in laws.LAWS:
+        picture = f"media/law-{law.name}.svg"
+        explained = [section for section in sections if picture in section]
+        assert len(explained) == 1, law.name
+        assert "$$" in explained[0], law.name
+        assert (DOCS / picture).is_file()
+
+
+def test_every_policy_of_the_package_is_on_the_page() -> None:
+    assert [name for name in policy_names() if f"`{name}`" not in PAGE] == []
+
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def readme_table(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "drawing"))
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "hooks"))
+    yield importlib.import_module("readme_table")
+    for name in ("readme_table", "standings", "declared_tables"):
+        sys.modules.pop(name, None)
+
+
+def test_the_table_is_made_from_the_result_files(readme_table: ModuleType) -> None:
+    assert readme_table.with_table(README) == README
+
+
+HOMES = ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR")
+
+
+def test_the_loop_plays_an_episode(capsys: pytest.CaptureFixture[str]) -> None:
+    runpy.run_path(str(DOCS / "tutorials" / "step_loop.py"))
+    policy = load("ddcs-distributed")
+    batch = posse.batch("smart", 1, seed=1, message_size=policy.message_size)
+    assert float(capsys.readouterr().out) == play(batch, policy)["safe_score"][0]
+
+
+def test_the_loop_is_in_the_readme_the_notebook_and_ten_lines_long() -> None:
+    loop = (DOCS / "tutorials" / "step_loop.py").read_text(encoding="utf-8").strip()
+    assert len(loop.replace("\n\n", "\n").splitlines()) == 10
+    assert loop in (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    notebook = json.loads((DOCS / "tutorials" / "notebook.ipynb").read_text(encoding="utf-8"))
+    assert loop in ["".join(cell["source"]) for cell in notebook["cells"]]
+
+
+@pytest.mark.long
+def test_the_notebook_runs(tmp_path: Path) -> None:
+    pytest.importorskip("nbclient", reason="no nbclient: pip install '.[docs]'")
+    out = tmp_path / "out.ipynb"
+    short = {"POSSE_NOTEBOOK_STEPS": "1000", "POSSE_NOTEBOOK_EPISODES": "2"}
+    script = DOCS / "drawing" / "notebook.py"
+    printed(script, "--out", out, **short, **{name: str(tmp_path) for name in HOMES})
+    cells = json.loads(out.read_text(encoding="utf-8"))["cells"]
+    text = [json.dumps(cell.get("outputs", "")) for cell in cells]
+    assert sum("<iframe srcdoc" in outputs for outputs in text) == 2
+    compared = next(outputs for outputs in text if "pngl-l-phi  " in outputs)
+    assert "smart-ppo-1" in compared
+
+
+@pytest.mark.long
+def test_it_measures(tmp_path: Path) -> None:
+    printed(ROOT / "benchmarks" / "speed.py", "--worlds", "2", "--no-cold", "--seconds", "0.01", cwd=tmp_path)
+    figures = json.loads((tmp_path / "runs" / "bench" / "speed.json").read_text(encoding="utf-8"))
+    assert {"machine", "batches", "one_world"} <= figures.keys()

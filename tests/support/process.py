@@ -1,0 +1,32 @@
+"""Python in a process of its own, which imports all packages from this tree."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+
+
+def python(
+    *words: str | Path, program: str | Path = sys.executable, cwd: Path = ROOT, seconds: float = 600.0, **variables: str
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with arguments; return what it printed, and how it ended."""
+    paths = [
+        ROOT,
+        *(ROOT / room for room in ("envs", "baselines", "training")),
+        *os.environ.get("PYTHONPATH", "").split(":"),
+    ]
+    settings: dict[str, Any] = {"capture_output": True, "text": True, "timeout": seconds, "check": False}
+    variables = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths)), **variables}
+    return subprocess.run([str(program), *map(str, words)], cwd=cwd, env=variables, **settings)
+
+
+def printed(*words: str | Path, **settings: Any) -> str:
+    """Return what :func:`python` prints; fail with its errors."""
+    done = python(*words, **settings)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
+    return done.stdout
