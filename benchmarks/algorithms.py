@@ -21,8 +21,8 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
 from posse_training.train.presets import default_settings
-from posse_training.train.settings import LAST, SETTINGS, TrainSettings
-from posse_training.train.train import resume, train
+from posse_training.train.settings import LAST, TrainSettings
+from posse_training.train.train import train
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 COLUMNS: Final = (
@@ -94,10 +94,7 @@ def main() -> None:
     todo = [(a, c, n) for n in s.seed for c in s.scenario for a in s.algorithm if (a, c, n) not in done]
     for algorithm, scenario, seed in todo:
         run = settings_of(s, algorithm, scenario, seed)
-        if (run.run_folder / SETTINGS).is_file():
-            resume(run.run_folder, console=console)
-        else:
-            train(run, console=console)
+        train(run, console=console)
         with TABLE.open("a", newline="", encoding="utf-8") as file:
             csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(row_of(run, algorithm, s.worlds))
 

@@ -152,7 +152,7 @@ def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequ
 
 
 def _card(name: str, policy: LearnedPolicy, run: TrainSettings) -> dict[str, Any]:
-    told = {"name": name, "settings": {**run.to_dict(), "folder": None}, "command": command_of(run)}
+    told = {"name": name, "settings": run.to_dict(), "command": command_of(run)}
     return {**policy.card, **told, "shipped_at": commit()}
 
 

@@ -14,8 +14,8 @@ from rich.console import Console
 
 from posse_training.errors import SettingsError
 from posse_training.train.presets import default_settings
-from posse_training.train.settings import LAST, SETTINGS, TrainSettings
-from posse_training.train.train import resume, train
+from posse_training.train.settings import LAST, TrainSettings
+from posse_training.train.train import train
 
 ALGORITHMS: Final = {
     "smart": "ppo",
@@ -65,7 +65,5 @@ if __name__ == "__main__":
     for run in all_runs(tyro.cli(Settings, description=__doc__)):
         if (run.run_folder / LAST).is_file():
             console.print(f"finished: {run.run_folder}", markup=False)
-        elif (run.run_folder / SETTINGS).is_file():
-            resume(run.run_folder, console=console, steps=run.steps)
         else:
             train(run, console=console)

@@ -74,7 +74,8 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280
     assert settings["overrides"] == {"horizon": 40, "settle_time": 1.0}
-    assert main(arguments.split()) == 2
-    assert "--resume" in capsys.readouterr().err
-    assert main(["train", "--resume", str(folder), "--steps", "1600"]) == 0
+    assert main([*arguments.split(), "--discount", "0.9"]) == 2
+    assert "holds a run with discount=0.99, not 0.9: choose another --out" in capsys.readouterr().err
+    assert main([*arguments.split(), "--steps", "1600"]) == 0
+    assert "resuming" in capsys.readouterr().out
     assert json.loads((folder / "settings.json").read_text())["steps"] == 1600

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,15 +17,11 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["LOCK", "InUseError", "hold_settings", "locked", "read_json"]
+__all__ = ["LOCK", "check_held", "hold_settings", "locked", "read_json"]
 
 LOCK: Final = "lock"
 """Name of the lock file in a folder."""
 _LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
-
-
-class InUseError(RunFolderError):
-    """A folder that another process holds."""
 
 
 @contextlib.contextmanager
@@ -36,7 +32,7 @@ def locked(folder: Path) -> Iterator[None]:
     was killed are removed.
 
     Raises:
-        InUseError: Another process holds it; the message has its number.
+        RunFolderError: Another process holds it; the message has its number.
         OSError: The folder cannot be written to, or contains a symbolic link, through which a write would land
             elsewhere; it names the file.
     """
@@ -49,8 +45,8 @@ def locked(folder: Path) -> Iterator[None]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 holder = file.read().strip() or "unknown"
-                raise InUseError(
-                    f"{folder} is in use by process {holder}: wait for it, stop it, or choose another folder"
+                raise RunFolderError(
+                    f"{folder} is in use by process {holder}: wait for it, stop it, or choose another --out"
                 ) from error
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
@@ -59,20 +55,26 @@ def locked(folder: Path) -> Iterator[None]:
         yield
 
 
-def hold_settings(path: Path, settings: Mapping[str, Any]) -> None:
-    """Write the settings that a run depends on, as JSON, or check that the run in the folder has the same.
+def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
+    """Raise if a file holds other settings of a run, but for those that are ``free``.
 
     Raises:
         RunFolderError: They differ, or cannot be read.
     """
-    if path.is_file():
-        try:
-            theirs = read_json(path)
-            differing = {name: theirs[name] for name in settings if theirs[name] != settings[name]}
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another folder") from error
-        if differing:
-            shown = ", ".join(f"{name}={value!r:.60}, not {settings[name]!r:.60}" for name, value in differing.items())
-            raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another folder, or remove it")
-    else:
-        write_atomically(path, (json.dumps(settings, indent=2) + "\n").encode())
+    if not path.is_file():
+        return
+    wanted = json.loads(json.dumps(settings))
+    try:
+        theirs = read_json(path)
+        other = {name: theirs[name] for name in wanted if name not in free and theirs[name] != wanted[name]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another --out") from error
+    if other:
+        shown = ", ".join(f"{name}={value!r:.60}, not {wanted[name]!r:.60}" for name, value in other.items())
+        raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another --out, or remove it")
+
+
+def hold_settings(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
+    """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
+    check_held(path, settings, free)
+    write_atomically(path, (json.dumps(settings, indent=2) + "\n").encode())

@@ -107,9 +107,7 @@ class LeagueSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as plain values, without the folder."""
-        values: dict[str, Any] = json.loads(json.dumps({**asdict(self), "folder": None}))
-        del values["folder"]
-        return values
+        return {**asdict(self), "folder": None}
 
 
 @dataclass(frozen=True)
@@ -238,7 +236,7 @@ class League:
         assert run is not None
         self.console.print(f"{trained.label}: {run}", markup=False)
         if (run / SETTINGS).is_file():
-            train(replace(read_settings(run / SETTINGS), folder=run), console=self.console, resume=True)
+            train(replace(read_settings(run / SETTINGS), folder=run), console=self.console)
             return
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
@@ -301,9 +299,8 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         load(team)
     for target in settings.targets:
         load_target(target)
-    held = {name: value for name, value in settings.to_dict().items() if name not in _FREE}
     with locked(settings.path):
-        hold_settings(settings.path / FILE, held)
+        hold_settings(settings.path / FILE, settings.to_dict(), _FREE)
         found.play()
         write_results(found)
     return found

@@ -197,7 +197,7 @@ class _Run:
                 )
         fields = ("policy", "scenario", "seed", "population", "worlds", "validation_worlds", "every")
         self.identity = {name: getattr(settings, name) for name in fields}
-        self.identity |= {"only": list(settings.only), "scenario_version": found.version}
+        self.identity |= {"only": settings.only, "scenario_version": found.version}
         self.names: list[str] = []  # of the settings that are searched
         self.told: list[tuple[list[list[float]], list[float]]] = []  # points (P, n) and scores (P,) of each generation
         self.curve: list[dict[str, Any]] = []  # scores of the search's mean on validation worlds, the defaults' first

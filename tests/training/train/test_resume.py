@@ -135,11 +135,11 @@ def test_a_folder_in_use(tmp_path: Path) -> None:
         pass
 
 
-def test_a_folder_that_holds_a_run(tmp_path: Path) -> None:
+def test_a_folder_that_holds_another_run(tmp_path: Path) -> None:
     train(small(tmp_path), console=quiet())
     before = (tmp_path / "checkpoint.pt").read_bytes()
-    with pytest.raises(RunFolderError, match="--resume"):
-        train(small(tmp_path), console=quiet())
+    with pytest.raises(RunFolderError, match=r"holds a run with seed=3, not 4: choose another --out"):
+        train(small(tmp_path, seed=4), console=quiet())
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
 
 

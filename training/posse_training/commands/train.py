@@ -1,11 +1,10 @@
-"""``posse train``: train a team, or resume a training run."""
+"""``posse train``: train a team, once or with several seeds."""
 
 from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated
@@ -16,8 +15,6 @@ from posse_training.errors import require
 from posse_training.options import Names, Ray
 from posse_training.train.presets import Preset, default_settings
 from posse_training.train.settings import SETTINGS, TrainSettings, read_settings
-
-_NEEDED = ("training", "torch", "stable_baselines3")
 
 
 @dataclass(frozen=True)
@@ -51,46 +48,27 @@ class _Arguments(TrainSettings):
         return TrainSettings(**{**values, "seed": self.seeds[0]})
 
 
-@dataclass(frozen=True)
-class _Resume:
-    """Resume a training run."""
-
-    resume: Path
-    """Run folder."""
-    steps: int | None = None
-    """Total steps to train for; default: as the run was started with."""
-
-
 def main(arguments: Sequence[str]) -> None:
-    """Train a team, once or with several seeds, or resume: ``posse train --resume DIR``."""
-    if any(a == "--resume" or a.startswith("--resume=") for a in arguments):
-        run = tyro.cli(_Resume, prog="posse train", args=arguments)
-        require(*_NEEDED)
-        from posse_training.train.train import resume
-
-        with _how_to_resume(run.resume):
-            path = resume(run.resume, steps=run.steps)
-        print(_what_next(path))
-        return
+    """Train a team, once or with several seeds; the same command resumes it."""
     asked = [a for a in arguments if a not in ("-h", "--help")]
     which, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
     default = default_settings(which.scenario, which.algorithm, side=which.side, preset=which.preset)
     given = tyro.cli(
         _Arguments,
         prog="posse train",
-        description="Train a team, or a target. To resume a run: posse train --resume DIR.",
+        description="Train a team, or a target. The same command again resumes a run, perhaps for more --steps.",
         default=_Arguments.from_dict({**default.to_dict(), "preset": which.preset}),
         args=arguments,
     )
-    require(*_NEEDED)
-    if len(given.seeds) != 1 or given.ray is not False:
-        _train_all(given)
-        return
-    from posse_training.train.train import train
+    require("training", "torch", "stable_baselines3")
+    from posse_training.train.seeds import train_seeds, with_seeds
 
-    with _how_to_resume(given.settings.run_folder):
-        path = train(given.settings)
-    print(_what_next(path))
+    try:
+        paths = list(train_seeds(with_seeds(given.settings, given.seeds), given.ray))
+    except KeyboardInterrupt:
+        print("\nto resume: run the same command again", file=sys.stderr)
+        raise
+    print("\n".join(map(str, paths)) if len(given.seeds) > 1 else _what_next(paths[0]))
 
 
 def _what_next(path: Path) -> str:
@@ -111,25 +89,3 @@ def _what_next(path: Path) -> str:
         f"  posse compare {teams} --scenario {scenario}{target}\n"
         f"  posse replay {teams} --scenario {scenario}{target} --out {page}"
     )
-
-
-def _train_all(given: _Arguments) -> None:
-    """Train with every seed, and print the files of the best policies."""
-    from posse_training.train.seeds import train_seeds, with_seeds
-
-    try:
-        for path in train_seeds(with_seeds(given.settings, given.seeds), given.ray):
-            print(path)
-    except KeyboardInterrupt:
-        print("\nto resume: run the same command again", file=sys.stderr)
-        raise
-
-
-@contextmanager
-def _how_to_resume(folder: Path) -> Iterator[None]:
-    """Print how to resume a run that the user interrupts."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        print(f"\nto resume: posse train --resume {folder}", file=sys.stderr)
-        raise

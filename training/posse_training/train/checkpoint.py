@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import functools
 import io
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,9 +20,9 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines.files import write_atomically
-from posse_training.errors import CheckpointError, RunFolderError
+from posse_training.errors import CheckpointError
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import SETTINGS, Point, TrainSettings
+from posse_training.train.settings import Point
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 State = dict[str, Any]
@@ -44,28 +43,6 @@ class Progress:
     rollouts: int = 0
     seconds: float = 0.0
     curve: list[Point] = field(default_factory=list)
-
-
-def open_run(folder: Path, settings: TrainSettings, resume: bool) -> State | None:
-    """Write the settings to a run folder; return its checkpoint, or ``None`` to start from scratch.
-
-    Raises:
-        RunFolderError: It holds a run that is not to be resumed.
-        CheckpointError: Its checkpoint is damaged.
-    """
-    saved = None
-    if resume:
-        # A run killed before its first checkpoint starts again, with the same result.
-        if (folder / CHECKPOINT).exists():
-            saved = read_checkpoint(folder)
-    elif (folder / SETTINGS).exists():
-        raise RunFolderError(
-            f"{folder} already holds a run: resume it (posse train --resume {folder}), remove it, "
-            "or choose another --out"
-        )
-    text = json.dumps({**settings.to_dict(), "folder": None}, indent=2) + "\n"
-    write_atomically(folder / SETTINGS, text.encode())
-    return saved
 
 
 def as_csv(curve: Iterable[Point]) -> bytes:

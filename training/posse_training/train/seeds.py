@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import platform
 import sys
 from collections.abc import Iterator, Sequence
@@ -17,10 +16,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from posse_training.errors import ClusterError, RunFolderError, SettingsError
-from posse_training.files import read_json
+from posse_training.errors import ClusterError, SettingsError
+from posse_training.files import check_held
 from posse_training.parallel import connected, on_ray
-from posse_training.train.settings import SETTINGS, TrainSettings
+from posse_training.train.settings import FREE, SETTINGS, TrainSettings
 from posse_training.train.train import check_before, train
 
 
@@ -28,10 +27,10 @@ def with_seeds(settings: TrainSettings, seeds: Sequence[int]) -> list[TrainSetti
     """Return the settings with each seed; a folder that is given holds a subfolder for each of several.
 
     Raises:
-        SettingsError: A seed out of its range, or one twice.
+        SettingsError: No seed, one out of its range, or one twice.
     """
-    if len(set(seeds)) < len(seeds):
-        raise SettingsError(f"seed={' '.join(map(str, seeds))} names one twice: leave it out")
+    if len(set(seeds)) < max(1, len(seeds)):
+        raise SettingsError(f"seed={' '.join(map(str, seeds))} names none, or one twice")
     folder = settings.folder if len(seeds) > 1 else None
     runs = [replace(settings, seed=seed) for seed in seeds]
     return runs if folder is None else [replace(run, folder=folder / f"seed-{run.seed}") for run in runs]
@@ -47,10 +46,10 @@ def train_seeds(runs: Sequence[TrainSettings], ray: bool | str) -> Iterator[Path
     """
     for settings in runs:
         check_before(settings)
-        _check_folder(settings)
+        check_held(settings.run_folder / SETTINGS, settings.to_dict(), FREE)
     if ray is False:
         for settings in runs:
-            yield _train(settings)
+            yield train(settings)
         return
     with connected(ray, log=True):
         results = dict(on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs]))
@@ -58,23 +57,6 @@ def train_seeds(runs: Sequence[TrainSettings], ray: bool | str) -> Iterator[Path
         if isinstance(results[k], Exception):
             raise results[k]
         yield results[k]
-
-
-def _check_folder(settings: TrainSettings) -> None:
-    """Raise if a run folder holds a run with other settings."""
-    path = settings.run_folder / SETTINGS
-    if not path.exists():
-        return
-    found = read_json(path)
-    wanted = json.loads(json.dumps({**settings.to_dict(), "folder": None}))
-    if found != wanted:
-        other = next((name for name in wanted if found.get(name) != wanted[name]), "?")
-        raise RunFolderError(f"{path.parent} holds a run with another {other}: remove it, or choose another --out")
-
-
-def _train(settings: TrainSettings, console: Console | None = None, num_threads: int | None = None) -> Path:
-    resume = (settings.run_folder / SETTINGS).exists()
-    return train(settings, console=console, resume=resume, num_threads=num_threads)
 
 
 def train_on_worker(settings: TrainSettings, where: Path) -> Path:
@@ -86,7 +68,8 @@ def train_on_worker(settings: TrainSettings, where: Path) -> Path:
     if not where.is_dir():
         raise ClusterError(f"node {platform.node()} has no folder {where}: train on a file system that all nodes share")
     with contextlib.chdir(where):
-        return _train(settings, Console(file=_Prefixed(f"seed {settings.seed}: "), width=100), num_threads=1)
+        console = Console(file=_Prefixed(f"seed {settings.seed}: "), width=100)
+        return train(settings, console=console, num_threads=1)
 
 
 class _Prefixed(io.StringIO):

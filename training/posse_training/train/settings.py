@@ -27,6 +27,8 @@ BEST: Final = "best.safetensors"
 LAST: Final = "last.safetensors"
 CURVE: Final = "curve.csv"
 """Files of a run folder; the checkpoint is one more."""
+FREE: Final = ("steps", "tensorboard", "wandb")
+"""Settings that the command that resumes a run may change."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,10 +208,8 @@ class TrainSettings:
         return f"{self.scenario.replace(',', '+')}{side}-{self.algorithm}-{self.seed}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the settings as plain values."""
-        values = dataclasses.asdict(self)
-        values["folder"] = None if self.folder is None else str(self.folder)
-        return values
+        """Return the settings as plain values, without the folder."""
+        return {**dataclasses.asdict(self), "folder": None}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:

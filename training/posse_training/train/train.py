@@ -17,8 +17,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
 from posse_baselines.files import write_atomically
-from posse_training.errors import CheckpointError, DivergedError, RunFolderError, SettingsError
-from posse_training.files import InUseError, locked
+from posse_training.errors import CheckpointError, DivergedError, SettingsError
+from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
@@ -26,7 +26,7 @@ from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
+from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
 from posse_training.train.worlds import check_opponents, load_own, make_advising, make_env
@@ -35,35 +35,33 @@ _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the s
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
 
 
-def train(
-    settings: TrainSettings, *, console: Console | None = None, resume: bool = False, num_threads: int | None = None
-) -> Path:
+def train(settings: TrainSettings, *, console: Console | None = None, num_threads: int | None = None) -> Path:
     """Train a policy; return the file of the one that scored best on the validation worlds.
+
+    A run folder that holds a run of the same settings is resumed, perhaps for more steps than before.
 
     Args:
         settings: All that the result depends on.
         console: Where to show progress.
-        resume: Continue from the run folder's checkpoint.
         num_threads: Threads that step the worlds; default: one per core. Never changes the result.
 
     Raises:
         SettingsError: A package that is not installed.
         PolicyError: An unknown policy, or one that cannot be an adviser.
-        RunFolderError: The folder is in use, or already holds a run.
+        RunFolderError: The folder is in use, or holds a run of other settings.
         CheckpointError: A checkpoint cannot be read.
         DivergedError: The networks give numbers that are not finite.
     """
     check_before(settings)
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
-        try:
-            stack.enter_context(locked(folder))
-        except InUseError as error:
-            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --out") from error
+        stack.enter_context(locked(folder))
+        hold_settings(folder / SETTINGS, settings.to_dict(), FREE)
+        # A run killed before its first checkpoint starts again, with the same result.
+        saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
         display = stack.enter_context(Display(settings, console or Console()))
-        saved = checkpoint.open_run(folder, settings, resume)
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
@@ -73,6 +71,7 @@ def train(
             run.begin()
         else:
             run.restore(saved)
+            display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
         display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
@@ -93,9 +92,7 @@ def resume(folder: Path, *, console: Console | None = None, steps: int | None = 
         steps: Total steps to train for, instead of those that the run was started with.
     """
     settings = replace(read_settings(folder / SETTINGS), folder=folder)
-    if steps is not None:
-        settings = replace(settings, steps=steps)
-    return train(settings, console=console, resume=True)
+    return train(settings if steps is None else replace(settings, steps=steps), console=console)
 
 
 def steps_made(settings: TrainSettings, num_envs: int) -> int:
