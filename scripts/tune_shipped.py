@@ -29,7 +29,9 @@ def repeat_all(folder: Path, console: Console) -> Iterator[Path]:
             words = shlex.split(json.loads(path.read_text(encoding="utf-8"))["command"])
             settings = tyro.cli(TuneSettings, args=words[2:])
             out = folder / f"{settings.policy}-{settings.scenario}-{settings.seed}"
-            yield tune(replace(settings, out=out, ship=True), console=console)
+            found = tune(replace(settings, out=out), console=console)
+            write_atomically(path, found.read_bytes())
+            yield found
 
 
 def check_all() -> Iterator[str]:

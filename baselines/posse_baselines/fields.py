@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,11 @@ def check(settings: Any) -> None:
     """
     for field in dataclasses.fields(settings):
         name, value, meta = field.name, getattr(settings, field.name), field.metadata
-        if "choices" in meta and value not in meta["choices"]:
-            raise ValueError(f"{name}={value!r} is unknown; known: {', '.join(meta['choices'])}")
+        choices = meta.get("choices", (value,))
+        if str(field.type).startswith("Literal["):
+            choices = get_args(get_type_hints(type(settings))[name])
+        if value not in choices:
+            raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
         if "low" not in meta or (value is None and field.default is None):
             continue
         whole = meta.get("whole", isinstance(field.default, int))

@@ -162,11 +162,11 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
 
 
 def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("posse_baselines.tuned", "posse_training.tune"):
-        monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
-    settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1, ship=True)
+    monkeypatch.setattr("posse_baselines.tuned.SHIPPED_TUNED", tmp_path / "shipped")
+    settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
     card = json.loads(tune(settings, console=quiet()).read_text())
     shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
+    shipped.parent.mkdir(parents=True)
     shipped.write_text(json.dumps({**card, "settings": {}}))
     (result,) = repeat_all(tmp_path / "again", quiet())
     assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card

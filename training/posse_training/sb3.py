@@ -28,17 +28,8 @@ from posse_training.train.vec_env import TeamVecEnv  # noqa: E402
 __all__ = ["ModelPolicy", "TeamVecEnv", "from_sb3"]
 
 
-def from_sb3(
-    model: BaseAlgorithm,
-    *,
-    name: str | None = None,
-    message_size: int = 0,
-    encoding: Encoding | None = None,
-    normalize: VecNormalize | None = None,
-    safeguard: bool = False,
-    deterministic: bool = True,
-) -> ModelPolicy:
-    """Return a policy that plays what a stable-baselines3 model has learned.
+class ModelPolicy(BasePolicy):
+    """A policy that plays what a stable-baselines3 model has learned.
 
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
     :class:`posse_training.sb3.TeamVecEnv`, plays every tracker of the team; one of (N, F), as in
@@ -59,33 +50,20 @@ def from_sb3(
     Raises:
         PolicyError: Spaces that no environment of posse has.
     """
-    return ModelPolicy(
-        model,
-        name=name or type(model).__name__,
-        message_size=message_size,
-        encoding=encoding,
-        normalize=normalize,
-        safeguard=safeguard,
-        deterministic=deterministic,
-    )
-
-
-class ModelPolicy(BasePolicy):
-    """What :func:`from_sb3` returns."""
 
     def __init__(
         self,
         model: BaseAlgorithm,
         *,
-        name: str,
-        message_size: int,
-        encoding: Encoding | None,
-        normalize: VecNormalize | None,
-        safeguard: bool,
-        deterministic: bool,
+        name: str | None = None,
+        message_size: int = 0,
+        encoding: Encoding | None = None,
+        normalize: VecNormalize | None = None,
+        safeguard: bool = False,
+        deterministic: bool = True,
     ) -> None:
         self.model = model
-        self.name = name
+        self.name = name or type(model).__name__
         self.message_size = message_size
         self._encoding = encoding
         self._normalize = normalize
@@ -148,3 +126,7 @@ class ModelPolicy(BasePolicy):
             guard.follow(observations)
             actions = guard.actions(actions)
         return actions, (layout, worlds, encoder, guard, states, np.zeros_like(begins))
+
+
+from_sb3 = ModelPolicy
+"""Makes a policy of a model."""

@@ -26,11 +26,11 @@ from posse_baselines import Policy, PolicyError, Tunable, load, play
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, optional, tunables
 from posse_baselines.files import write_atomically
-from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED
-from posse_training.errors import CheckpointError, RunFolderError, SettingsError, check_settings, require
+from posse_baselines.tuned import FORMAT
+from posse_training.errors import CheckpointError, SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
-from posse_training.files import LOCK, hold_settings, locked, read_json
+from posse_training.files import hold_settings, locked, read_json
 from posse_training.options import Ray
 from posse_training.parallel import connected, joined, on_ray
 from posse_training.provenance import commit
@@ -83,8 +83,6 @@ class TuneSettings:
     ray: Ray = False
     """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of this machine, or
     else all its cores. Extra: cluster."""
-    ship: bool = False
-    """Write the result to the package, where the policy's tuned version finds it."""
 
     @property
     def folder(self) -> Path:
@@ -150,26 +148,15 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
 
     Raises:
         PolicyError: An unknown policy, or one without tunable settings.
-        SettingsError: An unknown setting in ``only``, a policy that cannot ship, or nothing that has an effect.
+        SettingsError: An unknown setting in ``only``, or nothing that has an effect.
         RunFolderError: The folder is in use, or holds something else.
         CheckpointError: Its state is damaged.
     """
     require("training", "cmaes")
     run, folder = _Run(settings, console or Console()), settings.folder
-    shipping = {policy: SHIPPED_TUNED / name for name, policy in TUNED.items()}
-    if settings.ship and settings.policy not in shipping:
-        raise SettingsError(f"--ship needs a policy whose tuned version ships: {', '.join(shipping)}")
-    if folder.exists() and not (folder / SETTINGS).is_file():
-        others = [path.name for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else ["is a file"]
-        if others:
-            raise RunFolderError(f"{folder} is not the folder of a tuning run: {others[0]}. Choose another --out")
     with connected(settings.ray), locked(folder):
         hold_settings(folder / SETTINGS, run.identity)
-        content = (json.dumps(run.play(), indent=2, sort_keys=True) + "\n").encode()
-        write_atomically(folder / RESULT, content)
-    if settings.ship:
-        shipping[settings.policy].mkdir(parents=True, exist_ok=True)
-        write_atomically(shipping[settings.policy] / f"{settings.scenario}.json", content)
+        write_atomically(folder / RESULT, (json.dumps(run.play(), indent=2, sort_keys=True) + "\n").encode())
     return folder / RESULT
 
 

@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, NoReturn, Self
 
 import tyro
 
 from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, load
-from posse_baselines.fields import check, number, optional
-from posse_training.errors import SettingsError
+from posse_baselines.fields import number, optional
+from posse_training.errors import SettingsError, check_settings
 from posse_training.files import read_json
 from posse_training.options import Changes, MaybeNames, Names
 
@@ -235,16 +235,10 @@ class TrainSettings:
 
 def _check_each(s: TrainSettings) -> None:
     """Raise if a setting is out of its range."""
-    try:
-        check(s)
-    except ValueError as error:
-        raise SettingsError(str(error)) from None
-    for name, kind in get_type_hints(TrainSettings).items():
-        value = getattr(s, name)
-        if get_origin(kind) is Literal and value not in get_args(kind):
-            _fail(name, value, f"known: {', '.join(get_args(kind))}")
-        if get_origin(kind) is dict and not isinstance(value, dict):
-            _fail(name, value, "it must map names to values")
+    check_settings(s)
+    for name in ("overrides", "reward_weights"):
+        if not isinstance(getattr(s, name), dict):
+            _fail(name, getattr(s, name), "it must map names to values")
     for name in ("hidden", "team_sizes"):
         value = getattr(s, name)
         if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):
