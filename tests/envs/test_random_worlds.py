@@ -115,7 +115,7 @@ def judge_rewards(s: posse.Scenario, state: State, episode: Episode, rewards: np
         expected |= {"progress": episode.progress, "distance": episode.distance}
     for name, value in expected.items():
         near(infos[f"reward/{name}"][0, :n], value, name, 2e-4, 1e-4)
-    total = sum(weight * infos[f"reward/{name}"][0, :n].astype(float) for name, weight in s.reward_weights)
+    total = sum(weight * infos[f"reward/{name}"][0, :n].astype(float) for name, weight in dict(s.reward_weights).items())
     near(rewards[0, :n], total, "reward")
     assert set(state["tracker_slot"]) - {-1} == set(episode.occupied.values())
     near(infos["score"][0], episode.score, "score")
@@ -189,7 +189,7 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
 def started(case: int) -> tuple[posse.Batch, npt.NDArray[np.float32]]:
     """Start an episode that is short, and from starts nearby, so that much happens."""
     name, changes = CASES[case]
-    near = {"horizon": 160, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0}
+    near: dict[str, Any] = {"horizon": 160, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0}
     batch = posse.batch(name, 1, seed=8, **near, **changes)
     return batch, batch.reset(seed=8)
 

@@ -102,8 +102,7 @@ def test_twice_a_correction_is_added_to_what_the_script_proposes(correction: str
     memory = script.begin(batch.layout, 6)
     if correction == "velocity":
         encoding = Encoding.of(batch.layout, "belief")
-        proposal, memory = script.propose(observations, memory)
-        further = np.concatenate([proposal, script.belief(observations, memory)], axis=-1)
+        further, memory = script.propose(observations, memory, believes=True)
     else:
         encoding = Encoding.of(batch.layout)
         action, memory = script.act(observations, memory)

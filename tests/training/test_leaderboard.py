@@ -114,5 +114,5 @@ def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:
-    verdicts = [verify(sent(tmp_path, claim), worlds=2, progress=False) for _ in range(2)]
+    verdicts = [verify(sent(tmp_path, claim), episodes=2, progress=False) for _ in range(2)]
     assert len({2026, *(verdict.measured.seed for verdict in verdicts)}) == 3

@@ -337,9 +337,9 @@ class BeliefPlanner(DDCS):
             memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
         return super().restart(memory, mask)
 
-    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the wanted velocities (E, N, 2) of every team, before the safeguard."""
-        proposals, memory = super().propose(observations, memory)
+    def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
+        """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
+        proposals, memory = super().propose(observations, memory, believes=believes)
         minds: Minds = memory.minds
         me, beliefs = minds.me, memory.beliefs
         shape = me.shape
@@ -357,7 +357,8 @@ class BeliefPlanner(DDCS):
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])
         own = wish * me["heading"].conj() / me["max_speed"]
-        return np.where(planned[..., None], np.stack([own.real, own.imag], axis=-1), proposals), memory
+        proposals[planned, :2] = np.stack([own.real, own.imag], axis=-1)[planned]
+        return proposals, memory
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return those of the DDCS, with the ``estimate`` as believed where the planned motion is played."""

@@ -122,7 +122,7 @@ class Wrong(Weaver):
 def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) -> None:
     """Whether it is the caller's action that is refused, or that of the policy inside."""
     policy = Wrong(returned)
-    batch = posse.batch(SHORT, WORLDS, seed=1, target_policy=policy)
+    batch: Any = posse.batch(SHORT, WORLDS, seed=1, target_policy=policy)
     vector: Any = gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy)
     action = actions_of(0)
     for env, inner in ((batch, batch), (vector, vector.batch)):

@@ -107,14 +107,15 @@ def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
     together = posse.batch(scenario, COUNT, **make)
     alone = [posse.batch(scenario, 1, first_world=e, **make) for e in range(COUNT)]
     rng = np.random.default_rng(0)
-    outputs, expected = [together.reset()], [np.concatenate([each.reset() for each in alone])]
+    outputs: list[Any] = [together.reset()]
+    expected: list[Any] = [np.concatenate([each.reset() for each in alone])]
     for step in range(40):  # past the horizon, where worlds start anew
         for mine, theirs in zip(outputs, expected, strict=True):
             np.testing.assert_array_equal(mine, theirs)
         actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
         *outputs, infos = together.step(actions)
         outputs.append(infos["score"])
-        each = [world.step(actions[e : e + 1]) for e, world in enumerate(alone)]
+        each = [one.step(actions[e : e + 1]) for e, one in enumerate(alone)]
         expected = [np.concatenate(parts) for parts in zip(*(step[:4] for step in each), strict=True)]
         expected.append(np.concatenate([step[4]["score"] for step in each]))
         if step == 12:  # some start anew, in their midst some that are only looked at
