@@ -27,7 +27,7 @@ from posse.engine.batch import Batch, Snapshot
 from posse.engine.opponent import PairedBatch, TargetPolicy, batch, batches
 from posse.registry import DeclarationError
 from posse.scenarios import Family, Scenario, ScenarioError, family, family_names, get_scenario, scenario_names
-from posse.signals.generate import declarations_for, source_of
+from posse.signals.generate import kernel_source
 from posse.signals.layout import ObservationLayout
 
 __version__ = "0.1.0"
@@ -43,15 +43,6 @@ _register()
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
     """Return the fields of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
-
-
-def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> str:
-    """Return the source text of what the kernel of a scenario calls for its declarations.
-
-    It has one function each for the own observation fields, those of a team-mate, the rewards, the target's motion,
-    the sensor and the sums of the metrics.
-    """
-    return source_of(declarations_for(get_scenario(scenario, **overrides)))
 
 
 __all__ = [

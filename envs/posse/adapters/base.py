@@ -193,8 +193,9 @@ class WorldEnv(OwnArrays, BatchEnv):
     def _advance(self, actions: FloatArray) -> None:
         """Perform a control step by valid actions."""
         self.batch._advance(actions, self._results)
-        self._show()
+        if self.render_mode is not None:
+            self._show()
 
-    def _metrics(self) -> dict[str, float] | None:
-        """Return every metric of the episode at its end, ``None`` before."""
-        return {name: float(v[0]) for name, v in self.batch.metrics().items()} if self.batch._over else None
+    def _metrics(self) -> dict[str, float]:
+        """Return every metric of the episode."""
+        return {name: float(v[0]) for name, v in self.batch.metrics().items()}

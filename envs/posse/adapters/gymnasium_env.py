@@ -102,14 +102,14 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         motions = as_motions("action", action, self._shape, self._discrete)
         self._advance(in_box(motions.reshape(self._rows_shape), batch.clip_actions))
         rewards = own.rewards.tolist()
-        ends = own.terminated.item(), own.truncated.item()
+        ends = (own.terminated.item(), own.truncated.item()) if batch._over else (False, False)
         return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
     def _info(self) -> dict[str, Any]:
         """Return the info of the last step or reset."""
         own = self._own
         terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
-        info = self._infos.build(own.scores.item(), self._metrics(), terms)
+        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)

@@ -118,7 +118,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     def _infos_of(self, agents: list[str]) -> _AgentInfos:
         """Return the infos of the last step or reset."""
         own = self._own
-        infos = self._infos.by_agent(agents, own.scores.item(), self._metrics(), own.terms.T.tolist())
+        metrics = self._metrics() if self.batch._over else None
+        infos = self._infos.by_agent(agents, own.scores.item(), metrics, own.terms.T.tolist())
         if self._breakable:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks

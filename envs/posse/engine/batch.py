@@ -118,7 +118,7 @@ class Batch:
         try:
             self._arrays = WorldArrays.allocate(scenario, self.num_worlds)
         except (MemoryError, ValueError, OverflowError):
-            each = WorldArrays.allocate(scenario, 1).bytes_per_world
+            each = sum(array.nbytes for array in WorldArrays.allocate(scenario, 1))
             raise ScenarioError(
                 f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: lower it"
             ) from None

@@ -381,11 +381,6 @@ class WorldArrays(NamedTuple):
         # Arrays unpickled out of band would be read-only and possibly unaligned.
         return _copied, tuple(self)
 
-    @property
-    def bytes_per_world(self) -> int:
-        """Memory that one world takes, in bytes."""
-        return sum(array.nbytes for array in self) // len(self.world)
-
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
         return {

@@ -29,7 +29,7 @@ from posse.declarations import (
 )
 from posse.numeric import WIDTH
 from posse.registry import Declaration, Function, parameters_of, place_of
-from posse.scenarios import Scenario
+from posse.scenarios import Scenario, get_scenario
 
 
 class Declarations(NamedTuple):
@@ -104,9 +104,13 @@ def generated_for(declarations: Declarations) -> Generated:
     return Generated(**{name: scope[name] for name in Generated._fields})
 
 
-def source_of(declarations: Declarations) -> str:
-    """Return the source text of the functions for declarations."""
-    return _Module(declarations).text
+def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> str:
+    """Return the source text of what the kernel of a scenario calls for its declarations.
+
+    It has one function each for the own observation fields, those of a team-mate, the rewards, the target's motion,
+    the sensor and the sums of the metrics.
+    """
+    return _Module(declarations_for(get_scenario(scenario, **overrides))).text
 
 
 _FEW: Final = 2
