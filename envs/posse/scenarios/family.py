@@ -97,18 +97,12 @@ class Family:
         return self.base.replace(**values)
 
     def replace(self, **changes: Any) -> Family:
-        """Return a family with settings changed: a varied one gets another range or one value, any other one value.
+        """Return a family with settings changed: each gets a range or one value, as in :func:`posse.family`.
 
         Raises:
             ScenarioError: An unknown or invalid setting.
         """
-        ranges = dict(self.ranges)
-        for name in [name for name in changes if name in ranges]:
-            if isinstance(changes[name], (tuple, list)):
-                ranges[name] = _range(name, changes.pop(name))
-            else:
-                del ranges[name]
-        return dataclasses.replace(self, base=self.base.replace(**changes), ranges=tuple(ranges.items()))
+        return family(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return name, ranges and the settings of the base as plain values."""
@@ -161,16 +155,21 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
     """
     if isinstance(base, str) and base in FAMILIES:
         base = _named_family(base)
+    if isinstance(base, Family) and not settings and name is None:
+        return base
+    start, ranges = (base.base, dict(base.ranges)) if isinstance(base, Family) else (base, {})
+    rest, kinds = {}, Scenario.settings()
+    for setting, value in settings.items():
+        of_several = setting in kinds and kinds[setting].kind.startswith(("tuple", "Mapping"))
+        if isinstance(value, (tuple, list)) and not of_several:
+            ranges[setting] = _range(setting, value)
+        else:
+            ranges.pop(setting, None)
+            rest[setting] = value
+    scenario, items = get_scenario(start, **rest), tuple(ranges.items())
     if isinstance(base, Family):
-        changed = base.replace(**settings) if settings else base
-        return changed if name is None else dataclasses.replace(changed, name=name)
-    kinds = Scenario.settings()
-    whole_tuple = {n for n in settings if n in kinds and kinds[n].kind.startswith("tuple")}
-    ranges = {n: _range(n, v) for n, v in settings.items() if isinstance(v, (tuple, list)) and n not in whole_tuple}
-    rest = {n: v for n, v in settings.items() if n not in ranges}
-    scenario = get_scenario(base, **rest)
-    given = name or "-".join([scenario.name, "family", *ranges])
-    return Family(name=given, base=scenario, ranges=tuple(ranges.items()))
+        return dataclasses.replace(base, name=name or base.name, base=scenario, ranges=items)
+    return Family(name=name or "-".join([scenario.name, "family", *ranges]), base=scenario, ranges=items)
 
 
 FAMILIES: Final[dict[str, dict[str, Any]]] = {
