@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
-from typing import Any, Final, NamedTuple, TypeVar, cast
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +34,6 @@ from posse.signals.generate import Declarations, Generated, generated_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
 from posse.signals.views import OBSERVING
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
@@ -248,7 +246,7 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     return advance
 
 
-def direct(function: F) -> F:
+def direct(function: Callable[..., int]) -> Callable[..., int]:
     """Return the machine code of a kernel, which does not check the types of its arguments.
 
     numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
@@ -258,7 +256,7 @@ def direct(function: F) -> F:
     if UNCOMPILED:
         return np.errstate(over="ignore", under="ignore")(function)
     forms = list(getattr(function, "overloads", {}).values())
-    return cast("F", forms[0].entry_point) if len(forms) == 1 else function
+    return forms[0].entry_point if len(forms) == 1 else function
 
 
 _COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes

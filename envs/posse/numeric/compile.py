@@ -68,6 +68,7 @@ def kernel(function: F) -> F:
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).digest()
 _BUILD: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__, _CONFIG.OPT, _CONFIG.BOUNDSCHECK)
+_PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 
@@ -114,7 +115,7 @@ class _Reached(pickle.Pickler):
         try:
             pickle.dumps(value)
         except Exception:  # pickle may raise anything; such a value makes a kernel for this process alone
-            return tuple, ((os.getpid(), id(value)),)
+            return tuple, ((_PROCESS, id(value)),)
         return NotImplemented
 
 
@@ -130,8 +131,9 @@ def _parts_of(function: FunctionType) -> tuple[Any, ...]:
 def _found(scope: Mapping[str, Any], names: frozenset[str]) -> list[Any]:
     """Return the values of names in a scope, and in modules within it."""
     values = [(name, scope[name]) for name in sorted(names) if name in scope]
-    inside = [(k, v) for k, v in values if isinstance(v, ModuleType) and v.__name__ not in ("numba", "numpy")]
-    return [*values, *(_found(vars(module), names - {name}) for name, module in inside)]
+    modules = [(name, value) for name, value in values if isinstance(value, ModuleType)]
+    own = [each for each in modules if each[1].__name__.partition(".")[0] not in ("numba", "numpy")]
+    return [*values, *(_found(vars(module), names - {name}) for name, module in own)]
 
 
 @functools.cache
