@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from posse import declarations
+from posse.adapters import register as _register
 from posse.adapters.pettingzoo_env import env, parallel_env
-from posse.adapters.registration import register as _register
 from posse.adapters.robot import Command, Heard, Robot, TargetFix
 from posse.declarations import (
     SENSORS,

@@ -126,7 +126,7 @@ import posse
 import bearing
 import distance
 import spiral
-from posse.signals.global_state import StateLayout
+from posse.signals.layout import StateLayout
 
 @posse.metric("1")
 def last_heading(s, w):

@@ -21,7 +21,7 @@ from tests.support.reference.state import NAMES, State, headings, one_world, pos
 
 import posse
 from posse.declarations import TARGET_MOTIONS
-from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.scenario import FORMATIONS
 
 
 def some(*values: Any) -> st.SearchStrategy[Any]:
@@ -115,7 +115,9 @@ def judge_rewards(s: posse.Scenario, state: State, episode: Episode, rewards: np
         expected |= {"progress": episode.progress, "distance": episode.distance}
     for name, value in expected.items():
         near(infos[f"reward/{name}"][0, :n], value, name, 2e-4, 1e-4)
-    total = sum(weight * infos[f"reward/{name}"][0, :n].astype(float) for name, weight in dict(s.reward_weights).items())
+    total = sum(
+        weight * infos[f"reward/{name}"][0, :n].astype(float) for name, weight in dict(s.reward_weights).items()
+    )
     near(rewards[0, :n], total, "reward")
     assert set(state["tracker_slot"]) - {-1} == set(episode.occupied.values())
     near(infos["score"][0], episode.score, "score")

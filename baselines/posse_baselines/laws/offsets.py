@@ -13,7 +13,7 @@ import numpy as np
 
 from posse import ObservationLayout, Scenario
 from posse.numeric import FloatArray, Records
-from posse.scenarios.limits import OPEN_PLANE_EXTENT
+from posse.scenarios.setting import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
     *("heading", "position", "speed", "turn_rate", "number"),

@@ -13,14 +13,12 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
-from posse.engine.batch import Batch
-from posse.engine.infos import Infos
+from posse.engine.batch import Batch, Infos
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray, OwnArrays
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
-from posse.signals.global_state import StateLayout
-from posse.signals.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout, StateLayout
 
 _ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 

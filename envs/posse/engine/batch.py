@@ -17,7 +17,6 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of
-from posse.engine.infos import Infos
 from posse.engine.kernels import (
     LOOK,
     SCRATCH,
@@ -32,9 +31,8 @@ from posse.engine.kernels import (
     tables_of,
 )
 from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
-from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
-from posse.rules.state import NEVER, SPLITS, WorldArrays
+from posse.rules.state import NEVER, SPLITS, WorldArrays, new_scratch
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.generate import declarations_for
 from posse.signals.layout import ObservationLayout
@@ -59,6 +57,51 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
+
+
+class Infos:
+    """Builds the infos of a scenario.
+
+    ===================== ==========================================================================
+    ``score``             of the team in this step, [0, 1]
+    ``reward/<term>``     each reward term, unscaled (``posse.REWARD_TERMS``)
+    ``metrics/<metric>``  each metric of the episode (``posse.METRICS``); 0 before the step that ends it
+    ``working``           whether a tracker works; only in scenarios where trackers break
+    ===================== ==========================================================================
+
+    Args:
+        scenario: Names the terms and metrics.
+        zero: A metric before the end of the episode.
+    """
+
+    def __init__(self, scenario: Scenario, zero: Any) -> None:
+        declared = declarations_for(scenario)
+        rewards = [f"reward/{name}" for name in declared.term_names]
+        self._rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
+        names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
+        self._template = dict.fromkeys(names, zero)
+
+    def build(self, score: Any, metrics: Mapping[str, Any] | None, terms: Any = None) -> dict[str, Any]:
+        """Return an info; ``metrics`` by name where the episode ends, ``terms`` (K, ...) in the order of the names."""
+        info = self._template.copy()
+        info["score"] = score
+        if metrics is not None:
+            info.update((f"metrics/{name}", value) for name, value in metrics.items())
+        if terms is not None:
+            for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
+                info[key] = terms[k]
+        return info
+
+    def by_agent(
+        self, agents: list[str], score: float, metrics: Mapping[str, float] | None, terms: list[list[float]]
+    ) -> dict[str, dict[str, Any]]:
+        """Return the infos of agents by name, which differ in their own terms (rows, K)."""
+        common, rewards, infos = self.build(score, metrics), self._rewards, {}
+        for agent, own in zip(agents, terms):  # noqa: B905  equal lengths, in the hot path
+            infos[agent] = info = common.copy()
+            for key, k in rewards:
+                info[key] = own[k]
+        return infos
 
 
 class Batch:
@@ -376,7 +419,7 @@ class Batch:
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            Infos have the keys of :class:`posse.engine.infos.Infos` at every step: ``"score"`` (E,);
+            Infos have the keys of :class:`posse.engine.batch.Infos` at every step: ``"score"`` (E,);
             ``"reward/<term>"`` (E, rows); ``"metrics/<metric>"`` (E,), 0 where the episode goes on;
             ``"working"`` (E, N). With autoreset ``"same_step"`` also ``"final_obs"`` (E, rows, F),
             the observations before new episodes start. Arrays are never overwritten later.

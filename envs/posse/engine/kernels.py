@@ -24,11 +24,10 @@ from posse.rules.faults import apply_faults, draw_coming_faults
 from posse.rules.motion import drift, motion
 from posse.rules.randomness import mix
 from posse.rules.score import occupy, settle
-from posse.rules.scratch import RULES, scratch_record
 from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
-from posse.rules.state import WorldArrays, beam_directions, config_record, slot_records
+from posse.rules.state import RULES, WorldArrays, beam_directions, config_record, scratch_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together

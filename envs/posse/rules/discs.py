@@ -30,8 +30,7 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.scratch import DISCS, ROBOTS
-from posse.rules.state import BIT, NO_BITS, POSE, Pose
+from posse.rules.state import BIT, DISCS, NO_BITS, POSE, ROBOTS, Pose
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""

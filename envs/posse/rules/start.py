@@ -19,7 +19,7 @@ from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_ke
 from posse.rules.state import WorldArrays
 from posse.rules.targets.steering import free_circles
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.limits import START_CLEARANCE
+from posse.scenarios.setting import START_CLEARANCE
 
 _TRIES: Final = 2000
 _CLEARANCE: Final = np.float32(START_CLEARANCE)

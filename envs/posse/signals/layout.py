@@ -1,22 +1,29 @@
-"""Layout of a robot's observation: a flat float32 vector of named fields.
+"""Layouts of flat float32 vectors: a robot's observation, and the full state of a world.
 
-The own fields come first, then the sonar, then for each place of a team-mate its fields and
+In an observation the own fields come first, then the sonar, then for each place of a team-mate its fields and
 message; of the fields the built-in ones (:mod:`.own_fields`), then those that the scenario names.
 Unknown quantities hold the field's ``unknown`` value.
+
+The state, for centralized critics, determines the future of the world, apart from random draws: poses, speeds, the slot
+frame ψ, the target's goal heading and its motion's memory, obstacles, past and future faults, every tracker's fix, and
+the radio's last received and pending messages. Derived values (sonar, contacts, occupied slots, end of the episode) and
+the sums of metrics are not included.
 """
 
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import FIELDS, Field, fields_of
+from posse.declarations import FIELDS, TARGET_MOTIONS, Field, fields_of
 from posse.numeric import FloatArray
+from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario
-from posse.scenarios.limits import SLACK
+from posse.scenarios.setting import SLACK
 
 _SONAR = (
     "Distance from its rim to the nearest disc or wall along each beam, from straight ahead to the left; "
@@ -93,3 +100,111 @@ class ObservationLayout:
             part = source[..., start : start + field.size]
             views[field.name] = part[..., 0] if field.size == 1 else part
         return views
+
+
+_Values = npt.NDArray[Any]
+
+_POSE: Final = {"x": "m", "y": "m", "heading_cos": "1", "heading_sin": "1", "speed": "m/s", "turn_rate": "rad/s"}
+_FIX: Final = {"fix_x": "m", "fix_y": "m", "fix_cos": "1", "fix_sin": "1", "fix_frame_cos": "1", "fix_frame_sin": "1"}
+_FRAME: Final = {"frame_cos": "1", "frame_sin": "1", "goal_cos": "1", "goal_sin": "1"}
+
+
+_ODOMETRY: Final = {"x": "m", "y": "m", "heading": "rad"}
+
+
+class StateEntry(NamedTuple):
+    """One named part of the state vector: a field of the records, in physical units."""
+
+    name: str
+    unit: str
+    meaning: str
+    field: str
+    """Its name in :meth:`posse.rules.state.WorldArrays.by_name`."""
+    shape: tuple[int, ...] = ()
+
+
+class StateLayout:
+    """The entries of a scenario's state vector.
+
+    Attributes:
+        entries: Every :class:`StateEntry`, in order.
+        size: S, length of the vector.
+        offsets: Index of the first number of each entry, by name.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._control_step = scenario.control_step
+        one = WorldArrays.allocate(scenario, 1).by_name()
+        shaped = [entry._replace(shape=one[entry.field].shape[1:]) for entry in _entries(scenario)]
+        # A scenario without obstacles, messages or a radio that fails has nothing to say of them.
+        self.entries = tuple(entry for entry in shaped if 0 not in entry.shape)
+        ends = np.cumsum([int(np.prod(entry.shape)) for entry in self.entries]).tolist()
+        self.offsets = dict(zip((entry.name for entry in self.entries), [0, *ends], strict=False))
+        self.size: int = ends[-1]
+
+    def vector(self, arrays: WorldArrays) -> FloatArray:
+        """Return the states of a batch's worlds, a new array (E, S) float32."""
+        fields = arrays.by_name()
+        parts = [self._read(entry, fields).reshape(len(arrays.world), -1) for entry in self.entries]
+        return np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind")
+
+    def _read(self, entry: StateEntry, fields: Mapping[str, _Values]) -> _Values:
+        """Return the values of an entry, (E, *shape)."""
+        values, array = fields[entry.field], entry.field.partition("_")[0]
+        is_step = entry.unit == "s" and values.dtype == np.int32
+        if is_step:
+            values = np.where((values < 0) | (values >= NEVER), -1.0, values * self._control_step)
+        # What was never heard or sent is "none", whatever an earlier episode left there.
+        none = -1.0 if is_step else 0.0
+        if array == "heard" and entry.name != "heard_message":
+            values = np.where(fields["heard_step"] >= 0, values, none)
+        if array == "broadcast":
+            values = np.where(fields["broadcast_sent"] != 0, values, none)
+        if array in ("broadcast", "message", "command"):  # ring buffers by step: the newest first
+            newest = fields["world_step"][:, None] - (array == "command")
+            places = (newest - np.arange(values.shape[1])) % values.shape[1]
+            values = values[np.arange(len(values))[:, None], places]
+        return values
+
+    def views(self, vectors: FloatArray) -> dict[str, FloatArray]:
+        """Return named views (..., *shape) of state vectors (..., S)."""
+        if vectors.shape[-1] != self.size:
+            raise ValueError(f"states of shape {vectors.shape} do not fit: S = {self.size}")
+        views = {}
+        for entry in self.entries:
+            start = self.offsets[entry.name]
+            part = vectors[..., start : start + int(np.prod(entry.shape))]
+            views[entry.name] = part.reshape((*vectors.shape[:-1], *entry.shape))
+        return views
+
+
+def _entries(s: Scenario) -> list[StateEntry]:
+    """Return every entry, in order; control steps become times in s."""
+    memory = [each for motion in TARGET_MOTIONS.with_added(s.target_motion) for each in motion.memory]
+    rows = [
+        ("time", "s", "since the start", "world_step"),
+        *((f"target_{k}", unit, f"the target's {k}", f"world_{k}") for k, unit in {**_POSE, **_FRAME}.items()),
+        *((each.name, each.unit, each.meaning, f"world_{each.name}") for each in memory),
+        ("next_break", "s", "when the nearest tracker breaks; -1: never", "world_break_step"),
+        ("breaks_left", "count", "trackers that are still to break", "world_breaks_left"),
+        *((f"tracker_{k}", unit, f"each tracker's {k}", f"tracker_{k}") for k, unit in {**_POSE, **_FIX}.items()),
+        ("tracker_fix_vx", "m/s", "velocity from its fixes", "tracker_fix_vx"),
+        ("tracker_fix_vy", "m/s", "velocity from its fixes", "tracker_fix_vy"),
+        ("tracker_fix_time", "s", "when its fix was taken; -1: it has none", "tracker_fix_step"),
+        ("tracker_broken_at", "s", "when it broke; -1: it works", "tracker_broken_at"),
+        ("tracker_breaks_at", "s", "when it will break; -1: never", "tracker_breaks_at"),
+        ("tracker_sensor_dead_from", "s", "start of its sensor's outage; -1: none", "tracker_sensor_dead_from"),
+        ("tracker_radio_dead_from", "s", "start of its radio's outage; -1: none", "tracker_radio_dead_from"),
+        ("tracker_sees", "1", "1 while it sees the target", "tracker_sees"),
+        *((f"odometry_{k}", u, "error of each own pose", f"odometry_{k}") for k, u in _ODOMETRY.items()),
+        ("command", "1", "actions not yet executed, newest first", "command"),
+        *((f"obstacle_{k}", "m", f"each obstacle's {k}", f"obstacle_{k}") for k in ("x", "y", "radius")),
+        ("message", "1", "policies' messages, newest first", "message"),
+        ("heard_message", "1", "last received: receiver, sender", "heard_message"),
+        ("heard_time", "s", "when that was sent; -1: never", "heard_step"),
+        *((f"heard_{k}", unit, "of the sender, as last received", f"heard_{k}") for k, unit in _POSE.items()),
+        ("sent", "1", "1: a message was sent; in flight, newest first", "broadcast_sent"),
+        ("sent_fix_time", "s", "time of the fix sent; -1: none", "broadcast_fix_step"),
+        *((f"sent_{k}", unit, "as sent, newest first", f"broadcast_{k}") for k, unit in {**_POSE, **_FIX}.items()),
+    ]
+    return [StateEntry(*row) for row in rows]

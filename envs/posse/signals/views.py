@@ -30,7 +30,6 @@ from posse.numeric import (
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import columns, nonnegative
 from posse.rules.kinematics import turned
-from posse.rules.scratch import TEAM, Fields
 from posse.rules.state import (
     CONDITION,
     FIX,
@@ -38,7 +37,9 @@ from posse.rules.state import (
     NO_BITS,
     POSE,
     TARGET_POSE,
+    TEAM,
     Condition,
+    Fields,
     Fix,
     Odometry,
     Pose,
@@ -57,7 +58,7 @@ OBSERVING: Final[Fields] = (
     ("placed", WIDTH * TEAM),  # number of the team-mate; -1: none
     ("placed_at", WIDTH * TEAM),  # its distance, m
 )
-"""Fields of a thread's scratch memory used by observations (:mod:`posse.rules.scratch`)."""
+"""Fields of a thread's scratch memory used by observations (:mod:`posse.rules.state`)."""
 
 
 class Observers(NamedTuple):

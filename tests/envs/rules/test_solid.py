@@ -17,7 +17,7 @@ from tests.support.crowding import TOLERANCE, Complexes, Team, depth, points
 import posse
 from posse.declarations import TARGET_MOTIONS
 from posse.scenarios import ScenarioError
-from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.scenario import FORMATIONS
 
 CROWDED: dict[str, Any] = {
     "num_obstacles": 8,

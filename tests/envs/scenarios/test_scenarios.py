@@ -13,7 +13,7 @@ from tests.support.reference.score import slots
 
 import posse
 from posse.scenarios import get_scenario, scenario_names
-from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.scenario import FORMATIONS
 
 # A version rises when the behaviour of a named scenario changes, and only then.
 VERSIONS = {

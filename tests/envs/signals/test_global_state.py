@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import posse
 from posse.rules.state import WorldArrays
-from posse.signals.global_state import StateLayout
+from posse.signals.layout import StateLayout
 
 DRAWS: Final = ("world_seed", "world_split", "world_index", "world_episode", "world_key")
 FOLLOWS: Final = (

@@ -12,7 +12,7 @@ from tests.support.reference.senses import Said, Senses, sonar
 from tests.support.reference.state import TOUCHING, Array, State, headings, positions, working
 
 import posse
-from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.scenario import FORMATIONS
 
 
 def _in_order(recent: list[tuple[float, int, Said]], told: npt.NDArray[Any]) -> list[tuple[float, int, Said]]:

@@ -13,7 +13,7 @@ from torchrl.envs.utils import check_env_specs
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse.signals.global_state import StateLayout
+from posse.signals.layout import StateLayout
 from posse_baselines import PolicyError
 from posse_baselines.safeguard import Guard
 from posse_training.torchrl.env import PosseEnv

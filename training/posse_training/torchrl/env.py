@@ -26,7 +26,7 @@ from torchrl.envs import EnvBase
 
 import posse
 from posse.adapters.actions import MOTIONS, agent_names, single_action_space
-from posse.signals.global_state import StateLayout
+from posse.signals.layout import StateLayout
 from posse_baselines import PolicyError
 from posse_baselines.safeguard import Guard
 

@@ -31,7 +31,7 @@ from posse.numeric import (
 )
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
-from posse.scenarios.limits import SLACK
+from posse.scenarios.setting import SLACK
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
