@@ -21,7 +21,7 @@ HOSTILE = ["![p](https://x.invalid/p){: onerror=alert(1) }", "<script>", "a|b", 
 
 @pytest.fixture(scope="module")
 def claim(tmp_path_factory: pytest.TempPathFactory) -> Standing:
-    return submit("pngl", tmp_path_factory.mktemp("claim") / "sent", SCENARIO, episodes=WORLDS, progress=False)
+    return submit("pngl", tmp_path_factory.mktemp("claim") / "sent", SCENARIO, episodes=WORLDS)
 
 
 def sent(folder: Path, claim: Standing, **changes: Any) -> Path:
@@ -33,7 +33,7 @@ def sent(folder: Path, claim: Standing, **changes: Any) -> Path:
 
 
 def test_a_claim_is_what_an_evaluation_measures(claim: Standing) -> None:
-    played = evaluate("pngl", SCENARIO, WORLDS, 2026, progress=False)
+    played = evaluate("pngl", SCENARIO, WORLDS, 2026)
     assert claim.safe_score == pytest.approx(played["safe_score"].mean(), abs=1e-6, rel=0)
     assert (claim.seed, claim.split, claim.worlds, claim.reads_state) == (2026, "test", WORLDS, False)
 
@@ -48,7 +48,7 @@ def test_an_honest_claim_holds_on_fresh_worlds(
 
 def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Standing, tmp_path: Path) -> None:
     folder = sent(tmp_path, claim, safe_score=claim.safe_score + 0.003, high=1.0, low=0.0, score=1.0)
-    verdict = verify(folder, episodes=WORLDS, seed=3, progress=False)
+    verdict = verify(folder, episodes=WORLDS, seed=3)
     assert not verdict.holds
     assert verdict.repeated.safe_score == pytest.approx(claim.safe_score, rel=0, abs=0.002)
     assert verdict.measured.seed == 3
@@ -72,7 +72,7 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
 )
 def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ResultFileError, match=message):
-        verify(sent(tmp_path, claim, **changes), progress=False)
+        verify(sent(tmp_path, claim, **changes))
 
 
 def test_a_table_is_read_as_it_was_written(claim: Standing, tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
     assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--episodes", "3", "--out", str(out)]) == 0
     given.unlink()
     assert sorted(file.name for file in out.iterdir()) == ["mine.safetensors", CLAIM]
-    assert verify(out, episodes=3, progress=False).measured.policy == "mine.safetensors"
+    assert verify(out, episodes=3).measured.policy == "mine.safetensors"
 
 
 def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
@@ -114,5 +114,5 @@ def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:
-    verdicts = [verify(sent(tmp_path, claim), episodes=2, progress=False) for _ in range(2)]
+    verdicts = [verify(sent(tmp_path, claim), episodes=2) for _ in range(2)]
     assert len({2026, *(verdict.measured.seed for verdict in verdicts)}) == 3

@@ -151,7 +151,6 @@ def submit(
     name: str | None = None,
     episodes: int = WORLDS,
     seed: int = SEED,
-    progress: bool = True,
 ) -> Standing:
     """Play a scenario for the leaderboard, on its split ``test``, and write the claim.
 
@@ -162,7 +161,6 @@ def submit(
         name: Name on the leaderboard; default: the policy's.
         episodes: Number of worlds; 1,000 or more are ranked.
         seed: Seed of the worlds.
-        progress: Whether to show a bar.
 
     Raises:
         ResultFileError: An invalid label or name, or a folder that is not empty; nothing is played.
@@ -175,7 +173,7 @@ def submit(
     check_text("policy", text)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ResultFileError(f"{out} exists and is not an empty folder: choose another --out")
-    results = evaluate(loaded, scenario, episodes, seed, progress=progress)
+    results = evaluate(loaded, scenario, episodes, seed)
     claim = standing_of(label, text, loaded, results)
     out.mkdir(parents=True, exist_ok=True)
     if content is not None:
@@ -189,7 +187,6 @@ def verify(
     run_code: bool = False,
     episodes: int = WORLDS,
     seed: int | None = None,
-    progress: bool = True,
 ) -> Verdict:
     """Play a submission's policy on the worlds of its claim, and on worlds of a fresh seed.
 
@@ -201,7 +198,6 @@ def verify(
         run_code: Import a policy that is code. It runs with all your rights: read it first.
         episodes: Number of fresh worlds.
         seed: Seed of the fresh worlds; default: drawn now, so that no submission can know them.
-        progress: Whether to show a bar.
 
     Raises:
         ResultFileError: An invalid claim, code without ``run_code``, or another version of the scenario.
@@ -221,7 +217,7 @@ def verify(
     drawn = secrets.randbelow(2**31) if seed is None else seed
 
     def played(count: int, played_seed: int, split: str) -> Standing:
-        results = evaluate(policy, claim.scenario, count, played_seed, split=split, progress=progress)
+        results = evaluate(policy, claim.scenario, count, played_seed, split=split)
         return standing_of(claim.label, text, policy, results)
 
     return Verdict(claim, played(claim.worlds, claim.seed, claim.split), played(episodes, drawn, "test"))

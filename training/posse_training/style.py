@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -32,29 +33,8 @@ BOUND: Final = "bound"
 PLANNER: Final = "planner"
 WIDTH: Final = 7.2
 """Width of every figure, inches: that of a page of the manual."""
-RC: Final[Any] = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "legend.fontsize": 8.5,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": NOTE,
-    "axes.facecolor": PAPER,
-    "figure.facecolor": PAPER,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.7,
-    "lines.linewidth": 1.6,
-    "lines.markersize": 5.5,
-    "svg.fonttype": "none",  # text stays text
-    "svg.hashsalt": "posse",  # equal figures give equal files
-}
+RC: Final[Any] = mpl.rc_params_from_file(str(Path(__file__).with_name("posse.mplstyle")), use_default_template=False)
+"""Settings of matplotlib for every figure."""
 _LEGEND: Final = 124
 """Characters that fit side by side in a legend; a line and marker count as seven."""
 

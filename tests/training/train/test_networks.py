@@ -30,7 +30,7 @@ def test_adding_in_parts_is_adding_at_once() -> None:
     for part in np.split(rows, [1, 50, 300]):
         statistics.add(part)
     np.testing.assert_allclose(statistics.mean, rows.mean(axis=0), rtol=1e-5)
-    np.testing.assert_allclose(statistics.variance, rows.var(axis=0), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(statistics.var, rows.var(axis=0), rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(statistics.scale[:3], 1 / rows[:, :3].std(axis=0), rtol=1e-5)
     assert statistics.scale[3] == 0, "an input that never varies says nothing"
 

@@ -80,26 +80,6 @@ class Settings:
     """Settings to change in each scenario, such as num_trackers=3 or arena=6,4."""
 
 
-@dataclass
-class Comparison:
-    """All results, with the policies that were omitted or failed."""
-
-    reference: str
-    """The baseline of the differences."""
-    folder: Path
-    """Where they are written."""
-    plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
-    """By scenario and policy."""
-    rows: list[Row] = field(default_factory=list)
-    """The estimates of each, and the files of its rows."""
-    left_out: list[dict[str, str]] = field(default_factory=list)
-    """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
-    failed: list[dict[str, str]] = field(default_factory=list)
-    """Policies that raised, returned invalid actions, died or exceeded the time limit."""
-    figures: list[Path] = field(default_factory=list)
-    """The files that were drawn."""
-
-
 def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
     """Evaluate all policies; write rows, summary, figures and report.
 
@@ -127,19 +107,19 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     folder = _free(settings.out)
     if settings.ray is not False:
         require("cluster", "ray")
-    run = _Run(settings, scenarios, contenders, Comparison(contenders[0].label, folder))
+    found = Comparison(settings, scenarios, contenders, folder)
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
         if settings.ray is not False:
-            played = [(c, scenario, run.episodes(c)) for scenario in scenarios for c in contenders]
+            played = [(c, scenario, found.episodes(c)) for scenario in scenarios for c in contenders]
             report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
-            run.played = stack.enter_context(played_on_ray(played, run.game, settings.ray, report))
+            found.played = stack.enter_context(played_on_ray(played, found.game, settings.ray, report))
             bar.reset(task, total=len(scenarios) * len(contenders))
         folder.mkdir(parents=True, exist_ok=True)
         for scenario in scenarios:
-            run.play(scenario, lambda what: bar.update(task, description=what, advance=1))
-        run.write()
-    return run.found
+            found.play(scenario, lambda what: bar.update(task, description=what, advance=1))
+        found.write()
+    return found
 
 
 def _checked(settings: Settings) -> list[Scenario | Family]:
@@ -163,18 +143,34 @@ def _free(out: Path | None) -> Path:
 
 
 @dataclass
-class _Run:
-    """One comparison while it is played and written."""
+class Comparison:
+    """A comparison: what is played, and what has been found so far."""
 
     settings: Settings
     scenarios: Sequence[Scenario | Family]
     contenders: Sequence[Contender]
-    found: Comparison
+    folder: Path
+    """Where the results are written."""
+    plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
+    """By scenario and policy."""
+    rows: list[Row] = field(default_factory=list)
+    """The estimates of each, and the files of its rows."""
+    left_out: list[dict[str, str]] = field(default_factory=list)
+    """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
+    failed: list[dict[str, str]] = field(default_factory=list)
+    """Policies that raised, returned invalid actions, died or exceeded the time limit."""
+    figures: list[Path] = field(default_factory=list)
+    """The files that were drawn."""
     stopped: dict[str, str] = field(default_factory=dict)
     """Why policies that exceeded the time limit are not played again, by label."""
     stems: set[str] = field(default_factory=set)
     played: dict[Key, Played] = field(default_factory=dict)
     """What a cluster has played already."""
+
+    @property
+    def reference(self) -> str:
+        """The baseline of the differences."""
+        return self.contenders[0].label
 
     @property
     def game(self) -> Game:
@@ -190,55 +186,55 @@ class _Run:
 
     def play(self, scenario: Scenario | Family, report: Callable[[str], object]) -> None:
         """Play one scenario with every contender, and write the rows."""
-        found, name = self.found, scenario.name
+        name = scenario.name
         for contender in self.contenders:
             plays = self._attempt(contender, scenario)
             report(f"{contender.label} on {name}".replace("[", r"\["))
             if plays is None:
                 continue
-            found.plays[name, contender.label] = plays
-            reference = None if contender is self.contenders[0] else found.plays.get((name, found.reference))
+            self.plays[name, contender.label] = plays
+            reference = None if contender is self.contenders[0] else self.plays.get((name, self.reference))
             files = []
             for k, results in enumerate(plays.results):
                 member = f"-{k + 1}" if len(plays.results) > 1 else ""
                 files.append(f"{self._stem(f'{name}-{plays.label}{member}')}.csv")
-                results.write(found.folder / files[-1])
-            found.rows.append({**row_of(plays, reference), "files": files})
-        best = found.plays.get((name, PLANNER))
-        for row in found.rows:
+                results.write(self.folder / files[-1])
+            self.rows.append({**row_of(plays, reference), "files": files})
+        best = self.plays.get((name, PLANNER))
+        for row in self.rows:
             if row["scenario"] == name and best is not None:
-                mine, theirs = found.plays[name, row["policy"]].paired(best)
+                mine, theirs = self.plays[name, row["policy"]].paired(best)
                 row["of_planner"] = float(mine.mean() / theirs.mean()) if theirs.any() else float("nan")
 
     def write(self) -> None:
         """Write summary, export, figures and report."""
-        s, found = self.settings, self.found
+        s = self.settings
         if s.figures:
             self._report()
         if "marl-eval" in s.export:
-            write_marl_eval(found.plays, found.folder / "marl-eval.json")
-        rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in found.rows]
+            write_marl_eval(self.plays, self.folder / "marl-eval.json")
+        rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in self.rows]
         about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
         about["changed"] = s.overrides
-        about |= {"comparison": rows, "left_out": found.left_out, "failed": found.failed}
-        (found.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+        about |= {"comparison": rows, "left_out": self.left_out, "failed": self.failed}
+        (self.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
     def _attempt(self, contender: Contender, scenario: Scenario | Family) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
         label = contender.label
         why = {"policy": label, "what": scenario.name}
         if label in self.stopped and not self.played:
-            self.found.failed.append({**why, "why": self.stopped[label]})
+            self.failed.append({**why, "why": self.stopped[label]})
             return None
         try:
             return play(contender, scenario, self.episodes(contender), self.game, self.played)
         except PolicyError as error:
-            self.found.left_out.append({**why, "why": str(error)})
+            self.left_out.append({**why, "why": str(error)})
         except TimeLimitError as error:  # the next scenario would most likely take as long
             self.stopped[label] = f"not played: on {scenario.name} {error}"
-            self.found.failed.append({**why, "why": str(error)})
+            self.failed.append({**why, "why": str(error)})
         except PlayError as error:
-            self.found.failed.append({**why, "why": str(error)})
+            self.failed.append({**why, "why": str(error)})
         return None
 
     def _stem(self, wanted: str) -> str:
@@ -253,20 +249,20 @@ class _Run:
         """Draw the figures, record the replays, and write the report of all of it."""
         from posse_training.compare import figures, report  # matplotlib is slow
 
-        s, found = self.settings, self.found
-        found.figures = figures.draw(found.folder, found.plays, self.contenders)
-        shown = [(one, *self._record(one)) for one in report.extremes(found.plays, found.reference, s.replays)]
+        s = self.settings
+        self.figures = figures.draw(self.folder, self.plays, self.contenders)
+        shown = [(one, *self._record(one)) for one in report.extremes(self.plays, self.reference, s.replays)]
         versions = ", ".join(f"{scenario.name} v{scenario.version}" for scenario in self.scenarios)
         text = report.page(
             f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
             f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
-            found.reference,
-            found.rows,
-            found.figures,
+            self.reference,
+            self.rows,
+            self.figures,
             shown,
-            {"Left out": found.left_out, "Failed": found.failed},
+            {"Left out": self.left_out, "Failed": self.failed},
         )
-        (found.folder / REPORT).write_text(text, encoding="utf-8")
+        (self.folder / REPORT).write_text(text, encoding="utf-8")
 
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
@@ -276,10 +272,10 @@ class _Run:
         try:
             replays = [
                 replay(by_label[label], seed, scenario, one.world, game)
-                for label, seed in ((self.found.reference, 0), (one.policy, one.seed))
+                for label, seed in ((self.reference, 0), (one.policy, one.seed))
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
-            write_replay(join(replays), self.found.folder / name)
+            write_replay(join(replays), self.folder / name)
         except (PlayError, SettingsError, TimeLimitError) as error:
             return "", f"no replay: {error}"
         return name, ""

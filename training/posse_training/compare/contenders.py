@@ -10,6 +10,7 @@ from typing import Final
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
 from posse_training.errors import PlayError, TimeLimitError
+from posse_training.evaluation.evaluation import played_errors
 from posse_training.parallel import apart
 
 LONGEST_LABEL: Final = 100
@@ -75,10 +76,8 @@ def check_code(name: str, limit: float) -> None:
 
 
 def _load(name: str) -> None:
-    try:
+    with played_errors():
         load(name)
-    except PolicyError as error:
-        raise PolicyError(str(error)) from None  # its cause, an error of the code, may not survive pickling
 
 
 def _checked_code(name: str, limit: float) -> str:

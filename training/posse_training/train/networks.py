@@ -9,6 +9,7 @@ import numpy.typing as npt
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_mlp
 from torch import nn
 
@@ -41,30 +42,22 @@ class Normaliser(BaseFeaturesExtractor):
         return (observations - self.mean).mul_(self.scale).clamp_(-LIMIT, LIMIT)
 
 
-class RunningStatistics:
+class RunningStatistics(RunningMeanStd):
     """Running mean and variance of rows, (size,) each, in float64."""
 
     def __init__(self, size: int) -> None:
-        self.count = 0.0
-        self.mean = np.zeros(size)
-        self.variance = np.ones(size)
+        super().__init__(epsilon=0.0, shape=(size,))
 
     def add(self, rows: npt.NDArray[np.float32]) -> None:
         """Add rows (..., size) to the statistics."""
         flat = rows.reshape(-1, rows.shape[-1])
-        count = len(flat)
-        mean = flat.mean(axis=0, dtype=np.float64)
-        variance = flat.var(axis=0, dtype=np.float64)
-        total = self.count + count
-        delta = mean - self.mean
-        self.variance = (self.variance * self.count + variance * count + delta**2 * self.count * count / total) / total
-        self.mean = self.mean + delta * count / total
-        self.count = min(total, _REMEMBERED)
+        self.update_from_moments(flat.mean(axis=0, dtype=np.float64), flat.var(axis=0, dtype=np.float64), len(flat))
+        self.count = min(self.count, _REMEMBERED)
 
     @property
     def scale(self) -> npt.NDArray[np.float64]:
         """1 / deviation, (size,); 0 for inputs that do not vary."""
-        deviation = np.sqrt(self.variance)
+        deviation = np.sqrt(self.var)
         return np.where(deviation < _LEAST_DEVIATION, 0.0, 1 / np.maximum(deviation, 1e-12))
 
     def apply(self, policy: nn.Module) -> None:
@@ -77,7 +70,7 @@ class RunningStatistics:
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
         """Return the statistics as arrays by name."""
-        return {"count": np.array([self.count]), "mean": self.mean, "variance": self.variance}
+        return {"count": np.array([self.count]), "mean": self.mean, "variance": self.var}
 
     def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
         """Set the statistics to those of :meth:`save`.
@@ -88,7 +81,7 @@ class RunningStatistics:
         if saved["mean"].shape != self.mean.shape:
             raise ValueError(f"the mean has the shape {saved['mean'].shape}, wanted {self.mean.shape}")
         self.count = float(saved["count"][0])
-        self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()
+        self.mean, self.var = saved["mean"].copy(), saved["variance"].copy()
 
 
 class Front(nn.Module):
