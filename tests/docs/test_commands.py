@@ -32,7 +32,7 @@ SHORTER = {
     r"^posse demo$": r"posse demo --episodes 2 --seconds 1",
     r"^posse train .*": r"\g<0> --steps 512 --num-worlds 4 --rollout 16 --minibatch 64 --evaluate-worlds 2",
     r"^posse league .*$": r"\g<0> --generations 1 --target-steps 256 --team-steps 256 --response-steps 256"
-    " --episodes 2 --training num_worlds=4 evaluate_worlds=2",
+    " --episodes 2 --training num_worlds=16 evaluate_worlds=2",
     r"^posse compare (?!.*--scenario).*$": r"\g<0> --scenario smart",
     r"^posse compare .*$": r"\g<0> --episodes 2 --no-figures",
     r"^posse submit .*$": r"\g<0> --episodes 4",
@@ -42,7 +42,7 @@ SHORTER = {
     r"--seconds \d+": "--seconds 1",
     r"episodes=[\d_]+": "episodes=2",
     r"(evaluate\((?!.*episodes=).*)\)": r"\1, episodes=2)",
-    r"num_worlds=[\d_]+": "num_worlds=2",
+    r"(?<!training )num_worlds=[\d_]+": "num_worlds=2",
     r"learn\([\d_]+\)": "learn(64)",
     r"n_steps=\d+, batch_size=\d+": "n_steps=8, batch_size=80",
 }

@@ -17,7 +17,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["LOCK", "check_held", "hold_settings", "locked", "read_json"]
+__all__ = ["LOCK", "check_held", "check_new", "hold_settings", "locked", "read_json"]
 
 LOCK: Final = "lock"
 """Name of the lock file in a folder."""
@@ -53,6 +53,16 @@ def locked(folder: Path) -> Iterator[None]:
         file.flush()
         remove_unfinished(folder)
         yield
+
+
+def check_new(out: Path) -> None:
+    """Raise if a folder is neither new nor empty.
+
+    Raises:
+        RunFolderError: It is something else.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
 
 
 def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:

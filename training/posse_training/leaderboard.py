@@ -25,6 +25,7 @@ from posse_training.errors import ResultFileError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import mean
+from posse_training.files import check_new
 from posse_training.provenance import commit
 
 __all__ = ["Standing", "Verdict", "read_standings", "submit", "verify"]
@@ -163,7 +164,8 @@ def submit(
         seed: Seed of the worlds.
 
     Raises:
-        ResultFileError: An invalid label or name, or a folder that is not empty; nothing is played.
+        ResultFileError: An invalid name; nothing is played.
+        RunFolderError: A folder that is not empty; nothing is played.
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
@@ -171,8 +173,7 @@ def submit(
     label = name or (loaded.name if is_file else policy)
     check_text("name", label)
     check_text("policy", text)
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ResultFileError(f"{out} exists and is not an empty folder: choose another --out")
+    check_new(out)
     results = evaluate(loaded, scenario, episodes, seed)
     claim = standing_of(label, text, loaded, results)
     out.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ import platform
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
@@ -21,18 +22,19 @@ from rich.console import Console
 
 import posse
 from posse import Family, Scenario
-from posse.scenarios.family import blocks, scenario_or_family
-from posse_baselines import Policy, PolicyError, Tunable, load, play
+from posse.scenarios.family import scenario_or_family
+from posse_baselines import PolicyError, Tunable, load
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, optional, tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import CheckpointError, SettingsError, check_settings, require
+from posse_training.evaluation.episodes import play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import hold_settings, locked, read_json
 from posse_training.options import Ray
-from posse_training.parallel import connected, joined, on_ray
+from posse_training.parallel import connected, on_ray
 from posse_training.provenance import commit
 
 if TYPE_CHECKING:
@@ -163,8 +165,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
 class _Worlds(NamedTuple):
     seed: int
     split: str
-    first: int
-    number: int
+    indices: range
 
 
 class _Run:
@@ -254,8 +255,8 @@ class _Run:
     def _generation(self, cma: CMA, space: Space) -> None:
         """Score a generation on worlds of its own, the same for all its candidates."""
         s = self.settings
-        points = [cma.ask() for _ in range(s.population)]
-        worlds = _Worlds(s.seed, "train", len(self.told) * s.worlds, s.worlds)
+        points, first = [cma.ask() for _ in range(s.population)], len(self.told) * s.worlds
+        worlds = _Worlds(s.seed, "train", range(first, first + s.worlds))
         played = self._play([space.values(p) for p in points], worlds)
         scores = [float(metrics["safe_score"].mean()) for metrics in played]
         cma.tell([(p, -v) for p, v in zip(points, scores, strict=True)])
@@ -264,7 +265,7 @@ class _Run:
     def _validated(self, values: dict[str, float]) -> dict[str, Any]:
         """Return a point of the curve: settings, and their score on the validation worlds."""
         s, generation = self.settings, len(self.told)
-        (metrics,) = self._play([values], _Worlds(s.seed, "validation", 0, s.validation_worlds))
+        (metrics,) = self._play([values], _Worlds(s.seed, "validation", range(s.validation_worlds)))
         found = mean(metrics["safe_score"])
         text = f"generation {generation:>4}  safe score {found}"
         self.console.print(text, markup=False, highlight=False)
@@ -275,10 +276,14 @@ class _Run:
         """Return the metrics of each candidate, (worlds,) each."""
         s = self.settings
         threads = s.threads if s.ray is False else 1
-        calls = [(self.policy.with_settings(**values), self.scenario, worlds, threads) for values in candidates]
+        seed, split, indices = worlds
+        calls = [
+            (self.policy.with_settings(**values), None, self.scenario, seed, split, indices) for values in candidates
+        ]
+        play = partial(play_shard, num_threads=threads)
         if s.ray is False:
-            return [_played(*call) for call in calls]
-        found = dict(on_ray(_played, calls))
+            return [play(*call) for call in calls]
+        found = dict(on_ray(play, calls))
         for result in found.values():
             if isinstance(result, Exception):
                 raise result
@@ -286,7 +291,7 @@ class _Run:
 
     def _effective(self) -> list[str]:
         """Return the settings whose ends of the range change any score in a few training worlds."""
-        worlds = _Worlds(self.settings.seed, "train", 0, SCREENED_ON)
+        worlds = _Worlds(self.settings.seed, "train", range(SCREENED_ON))
         (usual,) = self._play([{}], worlds)
         defaults = {t.name: t.default for t in self.tunables}
         found: set[str] = set()
@@ -307,8 +312,8 @@ class _Run:
 
         s, best = self.settings, max(curve, key=lambda point: point["score"])
         values: dict[str, float] = best["settings"]
-        fresh = _Worlds(s.seed + FRESH_SEED, "validation", 0, s.validation_worlds)
-        check = _Worlds(2, "validation", 0, 32)
+        fresh = _Worlds(s.seed + FRESH_SEED, "validation", range(s.validation_worlds))
+        check = _Worlds(2, "validation", range(32))
         scores: dict[str, Any] = {}
         for name, metrics in zip(("tuned", "untuned"), self._play([values, {}], fresh), strict=True):
             others = {metric: float(metrics[metric].mean()) for metric in ("score", "contact_free")}
@@ -333,22 +338,11 @@ class _Run:
             "check": {
                 "split": check.split,
                 "seed": check.seed,
-                "worlds": check.number,
+                "worlds": len(check.indices),
                 "safe_score": float(checked["safe_score"].mean()),
             },
             "software": {**versions, "python": platform.python_version()},
         }
-
-
-def _played(policy: Policy, scenario: Scenario | Family, worlds: _Worlds, threads: int | None) -> dict[str, Point]:
-    """Return the metrics of a policy, (worlds,) each."""
-    seed, split, first, number = worlds
-    parts = blocks(scenario, range(first, first + number), seed, split)
-    batches = (
-        posse.Batch(one, len(part), seed=seed, split=split, first_world=part.start, num_threads=threads)
-        for one, part in parts
-    )
-    return joined([play(batch, policy) for batch in batches])
 
 
 def _mean(cma: CMA) -> Point:

@@ -24,10 +24,11 @@ from posse_training.compare.marl_eval import write_marl_eval
 from posse_training.compare.playing import Game, Key, Played, play, played_on_ray, replay
 from posse_training.compare.plays import Plays
 from posse_training.compare.table import Row, row_of, table
-from posse_training.errors import PlayError, RunFolderError, SettingsError, TimeLimitError, check_settings, require
+from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import Estimate
+from posse_training.files import check_new
 from posse_training.options import Changes, Ray, words_of
 from posse_training.provenance import commit
 from posse_training.replay import join, write_replay
@@ -137,8 +138,7 @@ def _free(out: Path | None) -> Path:
     if out is None:
         names = itertools.chain(["compare"], (f"compare-{k}" for k in itertools.count(2)))
         return next(path for name in names if not (path := Path("runs", name)).exists())
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
+    check_new(out)
     return out
 
 

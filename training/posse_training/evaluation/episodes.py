@@ -42,6 +42,10 @@ def limited(advance: Callable[[int], object], time_limit: float | None) -> Calla
     return check
 
 
+def no_report(steps: int) -> None:
+    """Take the number of steps that were played, and do nothing."""
+
+
 def play_shard(
     policy: Policy,
     target: Target | None,
@@ -51,7 +55,7 @@ def play_shard(
     shard: range,
     *,
     num_threads: int | None,
-    advance: Callable[[int], object],
+    advance: Callable[[int], object] = no_report,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
     played = []
@@ -62,9 +66,7 @@ def play_shard(
     return joined(played)
 
 
-def play_episode(
-    batch: Batch, policy: Policy, advance: Callable[[int], object] = lambda steps: None
-) -> dict[str, Column]:
+def play_episode(batch: Batch, policy: Policy, advance: Callable[[int], object] = no_report) -> dict[str, Column]:
     """Play one episode in every world of a batch; return every metric by name, (E,).
 
     They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority

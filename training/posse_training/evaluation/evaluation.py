@@ -19,7 +19,7 @@ from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
-from posse_training.evaluation.episodes import limited, play_shard, refuse_trained_split
+from posse_training.evaluation.episodes import limited, no_report, play_shard, refuse_trained_split
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
@@ -196,7 +196,7 @@ def _play_here(
 ) -> Arrays:
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy
-        advance = limited(lambda steps: None, time_limit)
+        advance = limited(no_report, time_limit)
         return play_shard(loaded, target, scenario, seed, split, shard, num_threads=1, advance=advance)
 
 

@@ -42,7 +42,7 @@ class TrainSettings:
     """
 
     scenario: Names = "smart"
-    """Scenario to train on, or several; in Python separated by commas."""
+    """Scenario to train on, or several (in Python one text with commas)."""
     algorithm: str = "ppo"
     """ppo, mappo (ppo with a value function that reads the state of the world), sac or td3."""
     steps: int = number(20_000_000, "", 1, 10**12)
@@ -56,8 +56,8 @@ class TrainSettings:
     side: Literal["trackers", "target"] = "trackers"
     """What learns: the trackers, or the target."""
     target: MaybeNames = None
-    """Targets that the trackers play against where these learn: names, files or package.module:Class; in Python
-    separated by commas. The worlds are divided evenly among them; a name twice gets two shares. Default: the
+    """Targets that the trackers play against where these learn: names, files or package.module:Class (in Python
+    one text with commas). The worlds are divided evenly among them; a name twice gets two shares. Default: the
     scenario's own target."""
     team: MaybeNames = None
     """Teams that a target plays against where it learns, likewise."""

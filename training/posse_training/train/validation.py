@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse_baselines import Policy, PolicyError, Target
+from posse_baselines import PolicyError, Target
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import mean
@@ -73,19 +73,15 @@ def play_all(settings: TrainSettings, policy: Any, seed: int, split: str) -> lis
     """
     found = []
     for pair in pairings(settings):
-        if settings.side != TARGET:
-            opponent = pair.opponent if isinstance(pair.opponent, Target) else None
-            found.append(
-                evaluate(
-                    policy, pair.scenario, settings.evaluate_worlds, seed, target=opponent, split=split, progress=False
-                )
-            )
-            continue
-        assert isinstance(pair.opponent, Policy)
-        target = policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
+        team: Any = policy
+        target: Any = pair.opponent
+        if settings.side == TARGET:
+            team, target = pair.opponent, policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
         played = evaluate(
-            pair.opponent, pair.scenario, settings.evaluate_worlds, seed, target=target, split=split, progress=False
+            team, pair.scenario, settings.evaluate_worlds, seed, target=target, split=split, progress=False
         )
-        denied = {"score": 1 - played["score"], "safe_score": 1 - played["score"]}
-        found.append(replace(played, columns={**played.columns, **denied}))
+        if settings.side == TARGET:
+            denied = {"score": 1 - played["score"], "safe_score": 1 - played["score"]}
+            played = replace(played, columns={**played.columns, **denied})
+        found.append(played)
     return found
