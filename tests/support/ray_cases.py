@@ -132,5 +132,5 @@ def test_seeds_are_trained_to_the_same_weights(nodes: Cluster, folder: Path) -> 
     command = "train --seed 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard"
     for name, *more in (["here"], ["there", "--ray"]):
         assert main([*command.split(), "--out", name, *more]) == 0
-    here, there = (load_file(folder / name / "seed-1" / "last.safetensors") for name in ("here", "there"))
+    here, there = (load_file(folder / name / "last.safetensors") for name in ("here", "there"))
     assert_equal(here, there)
