@@ -44,7 +44,7 @@ class TeamVecEnv(VecEnv):
         advising: Adviser whose proposals are appended to the observations, and corrected by the
             actions (2,) (:mod:`posse_baselines.learned.advice`).
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
-            (:mod:`posse_baselines.safeguard`).
+            (:mod:`posse_baselines.safeguard`); not with an adviser, which has one.
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.train.world_state`).
         staggered: Shorten the first episodes.
@@ -55,8 +55,8 @@ class TeamVecEnv(VecEnv):
         private_size: How many of them are the tracker's own; the rest is the state.
 
     Raises:
-        ValueError: No batch, one that resets itself, a target that is an agent, or batches whose
-            actions differ in length.
+        ValueError: No batch, one that resets itself, a target that is an agent, batches whose actions differ in
+            length, or a safeguard behind an adviser.
         PolicyError: An encoding that does not fit.
     """
 
@@ -70,7 +70,7 @@ class TeamVecEnv(VecEnv):
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
-        self.action_length = _action_length(batches, advising)
+        self.action_length = _action_length(batches, advising, safeguard)
         self.encoding = encoding
         self.staggered = staggered
         scenarios = [batch.scenario for batch in batches]
@@ -210,7 +210,7 @@ class TeamVecEnv(VecEnv):
         return [owners[slot] for slot in self._get_indices(indices)]
 
 
-def _action_length(batches: Sequence[Batch], advising: Advising | None) -> int:
+def _action_length(batches: Sequence[Batch], advising: Advising | None, safeguard: bool) -> int:
     """Return the length of an action; raise if the batches do not go together."""
     if not batches:
         raise ValueError("no batches given: a vector of slots needs at least one")
@@ -223,6 +223,8 @@ def _action_length(batches: Sequence[Batch], advising: Advising | None) -> int:
         both = batch.observation_shape[1] == batch.scenario.num_agents
         if both and batch.scenario.target_motion == "agent":
             raise ValueError(f"the target of {batch.scenario.name!r} is an agent; one policy drives one side")
+    if advising and safeguard:
+        raise ValueError("an adviser safeguards by itself: leave out advising or safeguard")
     lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
         raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")
@@ -252,8 +254,10 @@ class _SlotGroup:
         self.size = self.private_size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
-        self._advice = Advice(advising, batch) if advising else None
-        self._guard = Guard(batch.layout, worlds) if safeguard else None
+        # What makes the robots' actions of the model's.
+        self._layer: Advice | Guard | None = Guard(batch.layout, worlds) if safeguard else None
+        if advising:
+            self._layer = Advice(advising, batch)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
         # Rewards of the present episode so far, (E, N).
@@ -275,11 +279,11 @@ class _SlotGroup:
 
     def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
-        if self._advice is not None:
-            self._advice.restart(raw, mask)
-        if self._guard is not None:
-            self._guard.restart(mask)
-            self._guard.follow(raw)
+        if isinstance(self._layer, Advice):
+            self._layer.restart(raw, mask)
+        elif self._layer is not None:
+            self._layer.restart(mask)
+            self._layer.follow(raw)
         self._returns[mask] = 0
         self._cut_at[mask] = _NEVER
 
@@ -294,20 +298,16 @@ class _SlotGroup:
         """Step every world by the actions (slots, 2 + m); fill the other arrays, one row a slot."""
         batch = self.batch
         actions = actions.reshape(*batch.action_shape[:2], -1)
-        if self._advice is not None:
-            actions = self._advice.actions(actions)
-        if self._guard is not None:
-            actions = self._guard.actions(actions)
+        if self._layer is not None:
+            actions = self._layer.actions(actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
         rewards[:] = reward.reshape(-1)
         self._terms += [float(told[f"reward/{name}"].mean()) for name in batch.term_names]
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
-        if self._advice is not None:
-            self._advice.follow(raw)
-        if self._guard is not None:
-            self._guard.follow(raw)
+        if self._layer is not None:
+            self._layer.follow(raw)
         if ended.any():
             dones[:] = np.repeat(ended, batch.action_shape[1])
             self._report(raw, ended, terminated, over, infos)
@@ -324,8 +324,8 @@ class _SlotGroup:
     def _encode(self, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
         """Write the observations of all slots, or of those of some worlds, to ``out``."""
         self._encoder.encode(raw[worlds], out[:, : self._own_size])
-        if self._advice is not None:
-            further = self._advice.inputs[worlds]
+        if isinstance(self._layer, Advice):
+            further = self._layer.inputs[worlds]
             out[:, self._own_size : self.private_size] = further.reshape(-1, further.shape[-1])
         if self._state is not None:
             self._state.write(out[:, self.private_size :], worlds)
@@ -361,11 +361,10 @@ class _SlotGroup:
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return every array by name; views, not copies, without padding between fields."""
         own = {"cut_at": self._cut_at, "returns": self._returns, "terms": self._terms}
-        memory = self._advice.arrays() if self._advice is not None else {}
-        if self._guard is not None:
-            own |= {f"guard.{name}": array for name, array in self._guard.arrays().items()}
-        advice = {f"advice.{name}": array for name, array in memory.items()}
-        return {**self.batch.arrays.by_name(), **_arrays_inside(self.batch), **advice, **own}
+        if self._layer is not None:
+            kind = type(self._layer).__name__.lower()
+            own |= {f"{kind}.{name}": array for name, array in self._layer.arrays().items()}
+        return {**self.batch.arrays.by_name(), **_arrays_inside(self.batch), **own}
 
     def resume(self) -> None:
         """Have the batch take its arrays, which were written to, as running episodes."""
