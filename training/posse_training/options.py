@@ -37,11 +37,13 @@ def settings_of(words: Sequence[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for word in words:
         name, sign, text = word.partition("=")
-        if not (name and sign) or name in found:
+        if not (name and sign):
             raise ValueError(
-                f"{word!r:.80} sets nothing, or what is set already: write KEY=VALUE once for each, such as "
-                "target_speed=0.5 or arena=6,4, and names of policies before the options"
+                f"{word!r:.80} sets nothing: write KEY=VALUE, such as target_speed=0.5 or arena=6,4, and names of "
+                "policies before the options"
             )
+        if name in found:
+            raise ValueError(f"{name!r:.80} is set twice: leave out one KEY=VALUE")
         found[name] = value_of(text)
     return found
 

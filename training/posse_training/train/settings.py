@@ -268,9 +268,12 @@ def _check_together(s: TrainSettings) -> None:
             "safeguard=True goes with neither advise nor imitate, whose actions are not wanted velocities: "
             "use --no-safeguard; a correction of the adviser's velocity is safeguarded by the adviser"
         )
-    other = "target" if s.side == "target" else "team"
-    if getattr(s, other) is not None:
-        raise SettingsError(f"{other}={getattr(s, other)!r:.80} is what learns with side={s.side!r}: leave it out")
+    own, other = ("target", "team") if s.side == "target" else ("team", "target")
+    if getattr(s, own) is not None:
+        raise SettingsError(
+            f"{own}={getattr(s, own)!r:.80} is of the side that learns, side={s.side!r}: name what it plays against "
+            f"by {other}, or change side"
+        )
     if s.side == "target":
         _check_target(s)
     for name, instead in _ELSEWHERE.items():
