@@ -60,5 +60,5 @@ def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:
     assert (found.scenario, found.opponents) == ("constant,accelerating", {"smart": 1, "constant": 1})
     assert found.seed == 3
     assert [scenario.arena for scenario in found.scenarios] == [(30, 20), (30, 20)]
-    with pytest.raises(SettingsError, match="team='idle' is of the side that learns, side='trackers'.*by target"):
+    with pytest.raises(SettingsError, match=r"team='idle' is of the side that learns, side='trackers'.*by target"):
         TrainSettings(team="idle")
