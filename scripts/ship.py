@@ -239,12 +239,8 @@ def command_of(settings: TrainSettings) -> str:
         option = name.replace("_", "-")
         if isinstance(value, bool):
             words.append(f"--{option}" if value else f"--no-{option}")
-        elif isinstance(value, dict) and default[name]:
-            words += [w for k, v in value.items() for w in (f"--{option}.{k}", str(v))]
-        elif name == "overrides":
-            words += ["--set", *words_of(value)]
         elif isinstance(value, dict):
-            words += [f"--{option}", *(str(part) for item in value.items() for part in item)]
+            words += ["--set" if name == "overrides" else f"--{option}", *words_of(value)]
         elif name in ("scenario", "target", "team"):
             words += [f"--{option}", *str(value).split(",")]
         elif isinstance(value, (tuple, list)):

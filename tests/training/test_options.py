@@ -12,6 +12,7 @@ from posse_training.cli import main
 from posse_training.compare.compare import Settings
 from posse_training.errors import SettingsError
 from posse_training.options import settings_of, words_of
+from posse_training.train.presets import default_settings
 from posse_training.train.settings import TrainSettings, read_settings
 
 
@@ -54,11 +55,14 @@ def test_a_world_of_another_size_is_compared_and_replayed(tmp_path: Path, capsys
 
 def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:
     small = "--steps 1 --num-worlds 4 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard --hidden 8"
-    named = "--scenario constant accelerating --target smart constant --set arena=30,20 --seed 3"
+    named = (
+        "--scenario constant accelerating --target smart constant --set arena=30,20 --reward-weights slot=0.2 --seed 3"
+    )
     assert main(["train", *named.split(), *small.split(), "--out", str(tmp_path / "run")]) == 0
     found = read_settings(tmp_path / "run" / "settings.json")
     assert (found.scenario, found.opponents) == ("constant,accelerating", {"smart": 1, "constant": 1})
     assert found.seed == 3
+    assert found.reward_weights == {**default_settings().reward_weights, "slot": 0.2}
     assert [scenario.arena for scenario in found.scenarios] == [(30, 20), (30, 20)]
     with pytest.raises(SettingsError, match=r"team='idle' is of the side that learns, side='trackers'.*by target"):
         TrainSettings(team="idle")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -60,6 +60,7 @@ def main(arguments: Sequence[str]) -> None:
         default=_Arguments.from_dict({**default.to_dict(), "preset": which.preset}),
         args=arguments,
     )
+    given = replace(given, reward_weights={**default.reward_weights, **given.reward_weights})
     require("training", "torch", "stable_baselines3")
     from posse_training.train.seeds import train_seeds, with_seeds
 

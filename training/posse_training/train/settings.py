@@ -17,7 +17,7 @@ from posse_baselines import PolicyError, load
 from posse_baselines.fields import number, optional
 from posse_training.errors import SettingsError, check_settings
 from posse_training.files import read_json
-from posse_training.options import Changes, MaybeNames, Names
+from posse_training.options import Changes, MaybeNames, Names, Pairs
 
 Point = dict[str, float]
 """Results of an evaluation, by the columns of ``curve.csv``."""
@@ -77,8 +77,8 @@ class TrainSettings:
     """Numbers that a tracker adds to its broadcast in each step."""
     overrides: Changes = field(default_factory=dict)
     """Settings of the scenario to change, such as target_speed=0.5 or arena=6,4."""
-    reward_weights: dict[str, float] = field(default_factory=dict)
-    """Weight of each reward term; default: the scenario's own."""
+    reward_weights: Pairs = field(default_factory=dict)
+    """Weight of each reward term, such as slot=0.2; those that are not named keep their defaults."""
 
     end_on_contact: bool = False
     """A contact ends the training episode, so that the return of the rewards that follow is lost, as it is of the
