@@ -54,10 +54,8 @@ def test_a_world_of_another_size_is_compared_and_replayed(tmp_path: Path, capsys
 
 
 def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:
-    small = "--steps 1 --num-worlds 4 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard --hidden 8"
-    named = (
-        "--scenario constant accelerating --target smart constant --set arena=30,20 --reward-weights slot=0.2 --seed 3"
-    )
+    small = "--steps 1 --num-worlds 4 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard --seed 3"
+    named = "--scenario constant accelerating --target smart constant --set arena=30,20 --reward-weights slot=0.2"
     assert main(["train", *named.split(), *small.split(), "--out", str(tmp_path / "run")]) == 0
     found = read_settings(tmp_path / "run" / "settings.json")
     assert (found.scenario, found.opponents) == ("constant,accelerating", {"smart": 1, "constant": 1})
