@@ -15,7 +15,7 @@ from posse_training.errors import UserError
 
 GROUPS: Final = {
     "See what there is": {
-        "demo": ("a table of scores, films and a replay page", "demo"),
+        "demo": ("how a script, a learned team and the planner do; a replay and a film", "demo"),
         "scenarios": ("list the scenarios, or the settings of one", "commands.lists:scenarios"),
         "policies": ("list the policies", "commands.lists:policies"),
         "watch": ("show policies in a window, as a page or a film", "commands.watch"),

@@ -1,31 +1,34 @@
-"""``posse demo``: a table of scores, a film of the best team for each target motion, and a replay page."""
+"""``posse demo``: how a script, a learned team and the planner do, and a replay and a film of the first two."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 import tyro
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from posse_baselines import load, policy_names
+from posse import ObservationLayout, batch, get_scenario
+from posse_baselines import load
 from posse_training.errors import SettingsError
-from posse_training.evaluation import Estimate, Results, evaluate
+from posse_training.evaluation import evaluate
 from posse_training.evaluation.evaluation import progress_bar
-from posse_training.evaluation.statistics import mean, share
+from posse_training.evaluation.statistics import mean
 from posse_training.film import film
+from posse_training.parallel import apart
 from posse_training.replay import record, write_replay
 
-SCENARIOS: Final = ("constant", "accelerating", "smart")
-POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned")
-LEARNED: Final = "learned-smart"
-"""Plays the scenario that it was trained on, if it is shipped."""
+SCENARIO: Final = "smart"
+TEAMS: Final = {"script": "ddcs-tuned", "learned": "learned-smart", "planner": "planner"}
+SHOWN: Final = ("ddcs-tuned", "learned-smart")
+"""Teams in the replay and the film."""
 SEED: Final = 7
-FOLDER: Final = Path("runs/demo")
+_PLANNED: Final = 5  # a world of the planner takes as long as many of a script: it plays one in so many
+_COMPILING: Final = 300.0  # s, at most
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -33,84 +36,53 @@ def main(arguments: Sequence[str]) -> None:
     tyro.cli(demo, prog="posse demo", args=arguments)
 
 
-def demo(episodes: int = 500, seconds: float = 25.0) -> None:
-    """Play every scripted team in three scenarios; print a table, write films and a replay page.
+def demo(episodes: int = 50, seconds: float = 12.0, out: Path = Path("runs/demo")) -> None:
+    """Print which share of its slots each team holds, with 95 % intervals; write a replay page and a film.
 
     Args:
-        episodes: Worlds for each policy and scenario.
-        seconds: Simulated time of a film, s.
+        episodes: Worlds for each team; the planner plays a fifth of them.
+        seconds: Simulated time of the film, s.
+        out: Folder to write to.
     """
     if episodes < 2:
         raise SettingsError(f"episodes={episodes} is too few for an interval: 2 or more")
     if not 0 < seconds <= 3600:
         raise SettingsError(f"seconds={seconds} is not a length of a film: 0 to 3,600")
     console, started = Console(), time.perf_counter()
-    plays = [(scenario, policy) for scenario in SCENARIOS for policy in POLICIES]
-    if LEARNED in policy_names():
-        plays.append(("smart", LEARNED))
-    policies = {name: load(name) for _, name in plays}
-    results: dict[tuple[str, str], Results] = {}
-    written: dict[str, Path] = {}
     with progress_bar() as bar:
-        task = bar.add_task("compiling, then playing", total=len(plays))
-        for scenario, name in plays:
-            bar.update(task, description=f"{name} on {scenario}")
-            results[scenario, name] = evaluate(policies[name], scenario, episodes, SEED, progress=False)
+        task = bar.add_task("compiling, which takes longest the first time", total=len(TEAMS) + 3)
+        with ThreadPoolExecutor(1) as pool:  # the policies in a process of their own, beside the worlds
+            pool.submit(apart, _COMPILING, _compile_policies)
+            batch(SCENARIO, 1).reset()
+        bar.advance(task)
+        lines = []
+        for kind, name in TEAMS.items():
+            bar.update(task, description=f"{name} plays")
+            worlds = episodes if kind != "planner" else max(2, episodes // _PLANNED)
+            held = mean(evaluate(name, SCENARIO, worlds, SEED, progress=False)["safe_score"])
+            percent, off = 100 * held.value, 50 * (held.high - held.low)
+            lines.append(f"{kind:<8} {name:<14} held {percent:.0f} ± {off:.0f} % of its slots in {worlds} worlds")
             bar.advance(task)
-        for scenario in SCENARIOS:
-            names = shown(scenario, results)
-            bar.update(task, description=f"filming {scenario}")
-            teams, path = [(name, policies[name]) for name in names], FOLDER / f"{scenario}.gif"
-            written[f"{' beside '.join(names)} on {scenario}"] = film(
-                teams, scenario, seed=SEED, path=path, seconds=seconds
-            )
         bar.update(task, description="writing the replay page")
-        replay = record([policies[name] for name in names], scenario, seed=SEED)
-        written[f"{' beside '.join(names)} on {scenario}, to open in a browser"] = write_replay(
-            replay, FOLDER / "replay.html"
+        page = write_replay(record(list(SHOWN), SCENARIO, seed=SEED), out / "replay.html")
+        bar.update(task, advance=1, description="filming")
+        teams, path = [(name, load(name)) for name in SHOWN], out / f"{SCENARIO}.gif"
+        start = min(15.0, get_scenario(SCENARIO).duration - seconds)
+        film(
+            teams, SCENARIO, path=path, seed=SEED, start=max(0.0, start), seconds=seconds, speed=2, every=4, scores=True
         )
-    console.print(table(results))
-    for title, path in written.items():
-        console.print(f"{title}: {path}", markup=False, soft_wrap=True)
+    for line in lines:
+        console.print(line, markup=False, highlight=False)
+    console.print(f"Scenario {SCENARIO}; from a contact on nothing counts; the planner knows the state.")
+    console.print(f"replay: {page} (open it in a browser)", markup=False, soft_wrap=True)
+    console.print(f"film:   {path}", markup=False, soft_wrap=True)
     console.print(f"total time: {time.perf_counter() - started:.0f} s")
 
 
-def shown(scenario: str, results: Mapping[tuple[str, str], Results]) -> list[str]:
-    """Return the policies to film: the best scripted one, and the learned one if it played."""
-    best = max(POLICIES, key=lambda name: results[scenario, name]["safe_score"].mean())
-    return [best, LEARNED] if (scenario, LEARNED) in results else [best]
-
-
-def table(results: Mapping[tuple[str, str], Results]) -> Table:
-    """Return the table of scores, with 95 % intervals."""
-    episodes = next(iter(results.values())).episodes
-    made = Table(
-        title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals",
-        box=box.HORIZONTALS,  # no vertical bars: the figures need all of 80 characters
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    made.add_column("target", no_wrap=True)
-    made.add_column("policy", no_wrap=True)
-    for column in ("safe score", "tracking error, m", "settled", "settling time, s", "worlds with a contact"):
-        made.add_column(column)
-    before = ""
-    for (scenario, name), result in results.items():
-        if before not in ("", scenario):
-            made.add_section()
-        estimates = (
-            mean(result["safe_score"]),
-            mean(result["tracking_error"]),
-            share(result.settled),
-            mean(result["settling_time"]),
-            share(result.contacts > 0),
-        )
-        made.add_row("" if scenario == before else scenario, name, *map(_cell, estimates))
-        before = scenario
-    return made
-
-
-def _cell(estimate: Estimate) -> str:
-    if estimate.count == 0:
-        return "never"
-    return f"{estimate.value:.2f}\n[{estimate.low:.2f}, {estimate.high:.2f}]"
+def _compile_policies() -> None:
+    """Have every team act once, which compiles what it needs."""
+    for name in TEAMS.values():
+        policy = load(name)
+        layout = ObservationLayout(get_scenario(SCENARIO, message_size=policy.message_size))
+        if not policy.reads_state:
+            policy.act(np.zeros((1, layout.scenario.num_trackers, layout.size), np.float32), policy.begin(layout, 1))
