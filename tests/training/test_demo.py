@@ -30,7 +30,7 @@ def test_a_line_for_each_team_then_the_replay_and_the_film(
     assert lines[5] == "film:   shown/smart.gif"
     assert [player.name for player in read_replay("shown/replay.html").players] == ["ddcs-tuned", "learned-smart"]
     with Image.open("shown/smart.gif") as film:
-        assert film.size == (800, 500)
+        assert film.size == (800, 525)
 
 
 def test_it_needs_no_torch() -> None:

@@ -26,7 +26,9 @@ from posse_training.replay.page import PLAYERS, TASK_COLOURS
 
 _LARGEST: Final = 4096  # px, of width and height
 _MOST_FRAMES: Final = 2 << 30  # bytes of a GIF's, which are all in memory at once
-_STRIP: Final = 100  # px, height of the curves of scores
+_STRIP: Final = 100  # px, height of the curves of scores in a film of _NARROW px
+_NARROW: Final = 640  # px, of width: in a wider film text and curves grow
+_LARGER: Final = 1.4  # times the size of text in other frames: films are shown small
 _FLAT: Final = [c for c in vars(style).values() if isinstance(c, tuple)] + [*TASK_COLOURS, *PLAYERS]
 
 
@@ -152,7 +154,10 @@ def _frames(
 
     All panels have the smallest scale of all. A team whose episode has ended stays as it was.
     """
-    shown = [(team, Renderer(team.batch.scenario, size=size, title=f"{label}, {speed:g}×")) for label, team in teams]
+    shown = [
+        (team, Renderer(team.batch.scenario, size=size, title=f"{label}, {speed:g}×", scale=_LARGER))
+        for label, team in teams
+    ]
     for step in range(last + 1):
         ended = all(team.over for team, _ in shown) or step == last
         for team, renderer in shown:
@@ -163,12 +168,15 @@ def _frames(
         if step >= first and (ended or (step - first) % every == 0):
             panels = [renderer.draw(team.batch, colours=team.colours) for team, renderer in shown]
             image = Image.fromarray(np.hstack([panel for panel in panels if panel is not None]))
-            for k in range(1, len(panels)):
-                image.paste(style.GRID, (k * size[0] - 1, 0, k * size[0] + 1, size[1]))
+            point = _LARGER * min(size) / style.DESIGN_SIZE
+            for k, (_, colour) in enumerate(zip(panels, itertools.cycle(PLAYERS))):
+                if len(panels) > 1:
+                    image.paste(colour, (k * size[0], 0, (k + 1) * size[0], round(5 * point)))
+                if k:
+                    image.paste(style.GRID, (k * size[0] - 1, 0, k * size[0] + 1, size[1]))
             if any(team.colours for team, _ in shown):
                 led = any("leader" in team.told for team, _ in shown)
                 entries = list(zip(TASKS, TASK_COLOURS, strict=True))[: None if led else -1]
-                point = min(size) / style.DESIGN_SIZE
                 _write_key(image, entries, size[1] - 15 * point, max(0.6, point))
             yield image
         if ended:
@@ -189,23 +197,24 @@ def _write_key(image: Image.Image, entries: Sequence[tuple[str, style.Colour]], 
 
 def _with_curves(image: Image.Image, teams: Teams, first: int, last: int) -> Image.Image:
     """Return a frame with each team's score in the last second below, from the film's start to the present."""
-    k = 3  # drawn larger, then averaged down
-    strip = Image.new("RGB", (image.width * k, _STRIP * k), style.PAPER)
-    draw, left, right, top, low = ImageDraw.Draw(strip), 30 * k, strip.width - 14 * k, 32 * k, (_STRIP - 12) * k
+    unit, larger = max(1.0, image.width / _NARROW), 3  # drawn larger, then averaged down
+    k, height = unit * larger, round(_STRIP * unit)
+    strip = Image.new("RGB", (image.width * larger, height * larger), style.PAPER)
+    draw, left, right, top, low = ImageDraw.Draw(strip), 30 * k, strip.width - 14 * k, 32 * k, strip.height - 12 * k
     _write_key(strip, [(label, colour) for (label, _), colour in zip(teams, itertools.cycle(PLAYERS))], 14 * k, k)
     draw.text((left, 14 * k), "score of the last second", style.FAINT_INK, ImageFont.load_default(11 * k), anchor="lm")
     for value, y in ((1, top), (0, low)):
-        draw.line([(left, y), (right, y)], style.GRID, k)
+        draw.line([(left, y), (right, y)], style.GRID, round(k))
         draw.text((left - 8 * k, y), str(value), style.FAINT_INK, ImageFont.load_default(11 * k), anchor="rm")
     for (_, team), colour in zip(teams, itertools.cycle(PLAYERS)):
         second = round(1 / team.batch.scenario.control_step)
         smooth = np.convolve([0.0, *team.scores], np.full(second, 1 / second))[first : len(team.scores) + 1]
         points = [(left + (right - left) * n / (last - first), low - (low - top) * v) for n, v in enumerate(smooth)]
         if len(points) > 1:
-            draw.line(points, colour, 2 * k, joint="curve")
-    joined = Image.new("RGB", (image.width, image.height + _STRIP))
+            draw.line(points, colour, round(2 * k), joint="curve")
+    joined = Image.new("RGB", (image.width, image.height + height))
     joined.paste(image)
-    joined.paste(strip.resize((image.width, _STRIP), Image.Resampling.BOX), (0, image.height))
+    joined.paste(strip.resize((image.width, height), Image.Resampling.BOX), (0, image.height))
     return joined
 
 

@@ -39,6 +39,7 @@ class Renderer:
         size: Width and height of a frame, px.
         title: Shown above the frame; default: the scenario's name.
         keys: Keys of the window that are the caller's own, and what they do.
+        scale: Text and lines are so many times their usual size.
 
     Attributes:
         title: May be set between frames.
@@ -58,6 +59,7 @@ class Renderer:
         size: tuple[int, int] = (640, 640),
         title: str | None = None,
         keys: Mapping[str, str] | None = None,
+        scale: float = 1.0,
     ) -> None:
         check_choice("render_mode", mode, RENDER_MODES)
         given = np.asarray(size)
@@ -66,7 +68,7 @@ class Renderer:
         width, height = int(size[0]), int(size[1])
         self.scenario, self.mode, self.title, self.closed = scenario, mode, title or scenario.name, False
         self._canvas = Canvas((width, height))
-        self._point = min(width, height) / DESIGN_SIZE
+        self._point = scale * min(width, height) / DESIGN_SIZE
         above, below = round(HEADER * self._point), round(FOOTER * self._point)
         self.camera = Camera((0, above, width, height - above - below), scenario.half_sides)
         self._history = History()
