@@ -31,7 +31,7 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
             "70 %; the difference arose in one dart.",
         ),
         (player("b", [*WAY, *FULL[:20], *[0.0] * 20], (31, "break")), "40 %; the difference arose after one break."),
-        (player("b", [*WAY, *WAY, *FULL[:30]], (5, "dart")), "60 %; the difference arose on the way to them."),
+        (player("b", [*WAY, *WAY, *FULL[:30]], (5, "dart")), "60 %; the difference arose on the way to the slots."),
         (player("b", [*WAY, *[0.9] * 40]), "72 %."),  # nowhere in particular
         (player("b", [*WAY, *FULL], (11, "dart")), "80 %."),
         (
@@ -41,6 +41,10 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
         (
             player("b", [*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], (21, "dart"), (36, "dart")),
             "40 %; the difference arose in two darts.",
+        ),
+        (
+            player("b", [*WAY, *WAY, *FULL[:5], *WAY, *FULL[:15]], (26, "break")),
+            "40 %; the difference arose on the way to the slots and after one break.",
         ),
         (player("b", [*WAY, *FULL], (15, "contact")), "80 % (none counts from its contact at 1.5 s on)."),
     ],

@@ -62,15 +62,20 @@ def _losses(player: Player) -> tuple[dict[str, float], dict[str, int]]:
 
 
 def _reason(first: Player, second: Player) -> str:
-    """Return where the second team fell behind the first; empty if nowhere in particular."""
+    """Return where the second team fell behind the first, one cause or two; empty if nowhere in particular."""
     (kept, _), (lost, times) = _losses(first), _losses(second)
     behind = {cause: lost.get(cause, 0.0) - kept.get(cause, 0.0) for cause in {*lost, *kept}}
-    cause, total = max(behind, key=lambda cause: behind[cause]), sum(behind.values())
-    if not cause or total < 1 or behind[cause] < _MOST * total:
-        return ""
-    where = "on the way to them"
-    if cause != "way":
-        count = times[cause]
-        where = f"in {_NUMBERS[count] if count < len(_NUMBERS) else count} {cause}{'s' * (count != 1)}"
-        where = where.replace("in", "after", 1) if cause == "break" else where
-    return f"; {'the' if behind[cause] >= _ALL * total else 'most of the'} difference arose {where}"
+    total, greatest = sum(behind.values()), sorted(behind, key=lambda cause: -behind[cause])
+    for causes in (greatest[:1], greatest[:2]):
+        share = sum(behind[cause] for cause in causes) / max(total, 1e-9)
+        if total >= 1 and share >= _MOST and "" not in causes:
+            places = " and ".join(_place(cause, times[cause]) for cause in causes)
+            return f"; {'the' if share >= _ALL else 'most of the'} difference arose {places}"
+    return ""
+
+
+def _place(cause: str, count: int) -> str:
+    if cause == "way":
+        return "on the way to the slots"
+    word = _NUMBERS[count] if count < len(_NUMBERS) else count
+    return f"{'after' if cause == 'break' else 'in'} {word} {cause}{'s' * (count != 1)}"
