@@ -120,6 +120,19 @@ def test_the_head_says_what_happened_what_one_sees_and_how_to_make_it_again(
         assert views["height"] > 0.45 * size[1]
 
 
+def test_in_a_frame_of_another_page_it_plays_with_the_verdict_alone(browser: Browser, tmp_path: Path) -> None:
+    inner = write_replay(
+        short(), tmp_path / "host.html.inner.html"
+    )  # a request for what begins like the page is its own
+    (tmp_path / "host.html").write_text(f'<html data-ready="yes"><iframe src="{inner.name}" width="600" height="500">')
+    with opened(browser, tmp_path / "host.html") as page:
+        frame = page.frames[1]
+        frame.wait_for_selector("html[data-ready]")
+        assert frame.evaluate("window.replay.app.playing")
+        assert frame.locator("#verdict").is_visible()
+        assert not any(frame.locator(part).is_visible() for part in ("#seen", "#made", "#panel"))
+
+
 def test_where_poses_drift_each_tracker_has_a_ghost_in_the_pose_that_it_believes(
     browser: Browser, tmp_path: Path
 ) -> None:

@@ -91,7 +91,9 @@ function start() {
   new ResizeObserver(arrange).observe(views);
   addEventListener("resize", arrange);
   addEventListener("hashchange", readHash);
-  if (narrow.matches) document.body.classList.add("no-panel");
+  const framed = self !== top; // by another page, which has words of its own
+  document.body.classList.toggle("framed", framed);
+  document.body.classList.toggle("no-panel", framed || narrow.matches);
   set({});
   arrange();
   begin();
