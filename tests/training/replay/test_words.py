@@ -66,5 +66,5 @@ def test_the_command_makes_the_same_page(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_what_no_command_makes_has_none() -> None:
     assert command(hostile()) == ""
-    assert command(record(["idle"], "smart", target_speed=0.5, seconds=1)) == ""
-    assert command(short()).startswith("posse replay ddcs-distributed pursuit --scenario field --world 1")
+    assert command(record(["idle"], "smart", target_speed=0.5, seconds=1)).endswith(" --set target_speed=0.5")
+    assert command(short()).startswith("posse replay ddcs-distributed pursuit --scenario field ")

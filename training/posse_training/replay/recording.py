@@ -13,6 +13,7 @@ from posse import REWARD_TERMS, Field, Scenario, get_scenario, scenario_names
 from posse_baselines import Policy, Target, Trajectory, batch_for, load, load_target, rollout
 from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
+from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
 from posse_training.replay.columns import STATES, columns_of
 from posse_training.replay.episode import MOST_PLAYERS, Player, Replay, join
@@ -81,18 +82,19 @@ def record(
 
 def _options(scenario: Scenario, observations: bool, **played: object) -> list[str] | None:
     """Return the options with which ``posse replay`` plays this world; ``None``: it has none for some setting."""
-    named = get_scenario(scenario.name) if scenario.name in scenario_names() else None
-    is_given = isinstance(played["target"], str | None)
-    if named is None or not is_given or scenario != named.replace(num_trackers=scenario.num_trackers):
+    if scenario.name not in scenario_names() or not isinstance(played["target"], str | None):
         return None
-    options = {"scenario": scenario.name, **played}
-    if scenario.num_trackers != named.num_trackers:
-        options["num-trackers"] = scenario.num_trackers
+    named = get_scenario(scenario.name).to_dict()
+    changed = {name: value for name, value in scenario.to_dict().items() if named[name] != value}
+    settings = words_of(changed)
+    if settings_of(settings) != changed:
+        return None
     words: list[str] = []
-    for name, value in options.items():
+    for name, value in {"scenario": scenario.name, **played}.items():
         if value is not None:
             words += [f"--{name}", f"{value:.10g}" if isinstance(value, float) else str(value)]
-    return words if observations else [*words, "--no-observations"]
+    words += [] if observations else ["--no-observations"]
+    return [*words, "--set", *settings] if settings else words
 
 
 def replay_of(
