@@ -20,10 +20,18 @@ class _WithTeammates:
     _rows: int | slice = 0
     _fit: Any
 
-    def _join(self, number: int, teammates: str | Policy, silent: bool) -> None:
+    def __init__(
+        self,
+        *arguments: Any,
+        number: int = 0,
+        teammates: str | Policy = "ddcs-distributed",
+        silent: bool = True,
+        **settings: Any,
+    ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
         self.number, self._silent = number, silent
         self._fit = functools.partial(_fitting, self.teammates, number)
+        super().__init__(*arguments, **settings)
 
     def _make(self, scenario: Scenario, num_worlds: int, target_policy: Any, **settings: Any) -> Batch:
         if target_policy is not None:
@@ -56,34 +64,9 @@ class TrackerEnv(_WithTeammates, TeamEnv):
         PolicyError: Unknown team-mates.
     """
 
-    def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        *,
-        number: int = 0,
-        teammates: str | Policy = "ddcs-distributed",
-        silent: bool = True,
-        **settings: Any,
-    ) -> None:
-        self._join(number, teammates, silent)
-        super().__init__(scenario, **settings)
-
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
     """:class:`TrackerEnv` in E worlds, stepped together; arguments as there and for :class:`TeamVectorEnv`."""
-
-    def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        num_envs: int = 1,
-        *,
-        number: int = 0,
-        teammates: str | Policy = "ddcs-distributed",
-        silent: bool = True,
-        **settings: Any,
-    ) -> None:
-        self._join(number, teammates, silent)
-        super().__init__(scenario, num_envs, **settings)
 
 
 def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:

@@ -78,8 +78,8 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
 
 
 @compiled
-def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
-    """List the nearby discs; return their number."""
+def list_near(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+    """List the discs that are near the pose from which the robot observes; return their number."""
     at, world, settings = team.at, team.world, team.settings
     count, two, radius = 0, 2.0 * world.radius, float(world.radius)
     if me.known:
@@ -224,19 +224,17 @@ def foresee(team: Team, me: Record) -> None:
 
 
 @compiled
-def surround_ahead(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
     """List the discs that will be near when the command is executed; return their number.
 
     The sonar measures from the present pose, so that the list is made there and taken along.
     """
-    if me.lead <= 0.0:
-        return surround(team, me, mates, row, discs)
     lead, position, heading, target = me.lead, me.position, me.heading, me.target
     frame = me.frame
     me.lead, me.position, me.heading = 0.0, position - me.moved, heading * me.turned.conjugate()
     me.target = target - scaled(me.target_velocity, lead)
     me.frame = frame * vector(1.0, -me.psi_rate * lead)
-    count = surround(team, me, mates, row, discs)
+    count = list_near(team, me, mates, row, discs)
     me.lead, me.position, me.heading, me.target, me.frame = lead, position, heading, target, frame
     for k in range(count):
         discs[k].place += scaled(discs[k].velocity, lead) - me.moved

@@ -15,7 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
+from posse.numeric import (
+    MOST_THREADS,
+    BoolArray,
+    FloatArray,
+    Record,
+    Records,
+    compiled,
+    kernel,
+    over_worlds,
+    record_type,
+)
 from posse.rules import beam_directions
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
@@ -87,7 +97,7 @@ def work_for(num_trackers: int) -> Work:
 
 def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:
     """Return a record type, and a record with the value that each field has at the start of an episode."""
-    dtype = np.dtype((np.record, np.dtype([(name, kind) for name, kind, _ in fields], align=True)))
+    dtype = record_type(*((name, kind) for name, kind, _ in fields))
     start = np.zeros((), dtype)
     for name, _, value in fields:
         start[name] = value

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import Records
+from posse.numeric import Records, record_type
 from posse_baselines.fields import check, choice, number, tuned
 
 MODELS: Final = ("distributed", "centralized")
@@ -189,17 +189,12 @@ class Settings:
         return dataclasses.replace(self, **overrides)
 
 
-SETTINGS: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("forbidden", np.int64, (len(TASKS), len(TASKS)))
-                if field.name == "forbidden"
-                else (field.name, np.float64 if "low" in field.metadata else np.int64)
-                for field in dataclasses.fields(Settings)
-            ]
-        ),
+SETTINGS: Final = record_type(
+    *(
+        ("forbidden", np.int64, (len(TASKS), len(TASKS)))
+        if field.name == "forbidden"
+        else (field.name, np.float64 if "low" in field.metadata else np.int64)
+        for field in dataclasses.fields(Settings)
     )
 )
 """Settings as the kernels read them; a choice is its position among those allowed, ``forbidden`` a table of the

@@ -7,7 +7,7 @@ team avoids contact as well as the team itself does.
 from __future__ import annotations
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.actuation import detour, foresee, make_up, surround, surround_ahead
+from posse_baselines.ddcs.actuation import detour, foresee, make_up, surround
 from posse_baselines.ddcs.belief import write_belief
 from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
@@ -86,7 +86,7 @@ def carry_out(
 ) -> None:
     """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
     correct(me, complex(float(action[0]), float(action[1])))
-    discs = work.discs[: surround_ahead(team, me, mates, row, work.discs)]
+    discs = work.discs[: surround(team, me, mates, row, work.discs)]
     velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
     if team.settings.detour > 0.0 and me.task != FLOCKING:
         velocity = detour(team, me, discs, velocity)

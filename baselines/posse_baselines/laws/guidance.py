@@ -32,11 +32,11 @@ one that does not obey the law yet is turned by the shorter turn, at the limit. 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, compiled
+from posse.numeric import FloatArray, Record, compiled, record_type
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, wrap
 
 MIN_COSINE: Final = 0.6
@@ -46,23 +46,15 @@ _MIN_RANGE: Final = 1e-3  # m; a shorter one counts as this one where it is divi
 _BRAKING_SHARE: Final = 0.8
 _STANDSTILL: Final = 1e-3  # m/s
 
-BODY: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("heading", np.complex128),
-                ("speed", np.float64),  # m/s
-                ("omega", np.float64),  # turn rate, rad/s
-                ("max_speed", np.float64),
-                ("max_omega", np.float64),
-                ("acceleration", np.float64),  # greatest change of the speed, m/s²
-                ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
-                ("dt", np.float64),  # control step, s
-            ],
-            align=True,
-        ),
-    )
+BODY: Final = record_type(
+    ("heading", np.complex128),
+    ("speed", np.float64),  # m/s
+    ("omega", np.float64),  # turn rate, rad/s
+    ("max_speed", np.float64),
+    ("max_omega", np.float64),
+    ("acceleration", np.float64),  # greatest change of the speed, m/s²
+    ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
+    ("dt", np.float64),  # control step, s
 )
 """A robot's present motion and its limits."""
 

@@ -7,12 +7,12 @@ what they observe, and the constants of their scenario, are converted once, to a
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import FloatArray, Records
+from posse.numeric import FloatArray, Records, record_type
 from posse.scenarios.setting import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
@@ -28,48 +28,32 @@ _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 
-OFFSETS: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
-                ("neighbours", np.int32),  # places for team-mates
-                ("stride", np.int32),  # length of one team-mate's part
-                ("sonar_beams", np.int32),
-                ("message_size", np.int32),
-            ],
-            align=True,
-        ),
-    )
+OFFSETS: Final = record_type(
+    *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
+    ("neighbours", np.int32),  # places for team-mates
+    ("stride", np.int32),  # length of one team-mate's part
+    ("sonar_beams", np.int32),
+    ("message_size", np.int32),
 )
 """Offsets of the fields of a layout.
 
 A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
 """
 
-CONSTANTS: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("dt", np.float32),  # control step, s
-                ("delay", np.int32),  # control steps after which a command is executed
-                ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
-                ("sonar_range", np.float32),  # reading that means "nothing near", m
-                ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
-                ("radius", np.float32),  # of a robot's disc, m
-                ("walled", np.int32),
-                ("half_width", np.float32),  # of the arena, m
-                ("half_height", np.float32),
-                ("sight", np.float32),  # how far its target sensor reaches, m
-                ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
-                ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
-                ("area_y", np.float32),  # half its height
-            ],
-            align=True,
-        ),
-    )
+CONSTANTS: Final = record_type(
+    ("dt", np.float32),  # control step, s
+    ("delay", np.int32),  # control steps after which a command is executed
+    ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
+    ("sonar_range", np.float32),  # reading that means "nothing near", m
+    ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
+    ("radius", np.float32),  # of a robot's disc, m
+    ("walled", np.int32),
+    ("half_width", np.float32),  # of the arena, m
+    ("half_height", np.float32),
+    ("sight", np.float32),  # how far its target sensor reaches, m
+    ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
+    ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
+    ("area_y", np.float32),  # half its height
 )
 """Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
 

@@ -9,11 +9,11 @@ position from that of the wanted velocity.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import Record, Records, compiled, record_type
 from posse_baselines.laws.geometry import clip, dot, length, scaled, vector, wrap
 from posse_baselines.laws.guidance import heading_error, turn_command
 
@@ -43,35 +43,19 @@ _CONTACT_COST: Final = 4.0
 _INTRUSION_COST: Final = 3.0
 _PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
 
-DISC: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("place", np.complex128),  # from the tracker, m
-                ("velocity", np.complex128),  # m/s
-                ("reach", np.float64),  # distance between the centres at contact, m
-                ("margin", np.float64),  # clearance, m
-            ],
-            align=True,
-        ),
-    )
+DISC: Final = record_type(
+    ("place", np.complex128),  # from the tracker, m
+    ("velocity", np.complex128),  # m/s
+    ("reach", np.float64),  # distance between the centres at contact, m
+    ("margin", np.float64),  # clearance, m
 )
 """An object to avoid, relative to the tracker."""
 
 _OF_DIRECTION: Final = ("error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead")
 _OF_PLAY: Final = ("speed", "x", "y", "danger", "going")
-PLAYS: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                *((name, np.float64, (_DIRECTIONS,)) for name in _OF_DIRECTION),
-                *((name, np.float64, (_PLAYS,)) for name in _OF_PLAY),
-            ],
-            align=True,
-        ),
-    )
+PLAYS: Final = record_type(
+    *((name, np.float64, (_DIRECTIONS,)) for name in _OF_DIRECTION),
+    *((name, np.float64, (_PLAYS,)) for name in _OF_PLAY),
 )
 """What :func:`play_all` works in: all directions at the first speed, then at the next one. Floats by component, since
 the loops over them are vectorised."""

@@ -4,7 +4,7 @@ Arrays and records, constants, lanes (blocks of eight numbers), the decorators t
 distribution of work over threads. It depends on no other room, and every room may import it.
 """
 
-from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records
+from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records, record_type
 from posse.numeric.compile import UNCOMPILED, compiled, kernel, out_of_line, stamp
 from posse.numeric.lanes import (
     WIDTH,
@@ -58,6 +58,7 @@ __all__ = [
     "lowest_bit",
     "out_of_line",
     "over_worlds",
+    "record_type",
     "root",
     "stamp",
     "store",

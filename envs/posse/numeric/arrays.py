@@ -14,6 +14,12 @@ Records = npt.NDArray[Any]
 FloatArray = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
 
+
+def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return the type of a record with fields (name, type) or (name, type, shape); compiled code reads it by name."""
+    return np.dtype((np.record, np.dtype(list(fields), align=True)))
+
+
 # Compiled code calculates in float32 only if its constants are float32.
 ZERO: Final = np.float32(0.0)
 HALF: Final = np.float32(0.5)

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import METRICS, SENSORS, TARGET_MOTIONS, Metric, TargetMotion
-from posse.numeric import WIDTH, FloatArray, Lanes, Records
+from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
 from posse.scenarios.scenario import FORMATIONS
 from posse.scenarios.setting import FAR, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
@@ -30,10 +30,6 @@ BIT: Final = np.uint64(1)
 NO_BITS: Final = np.uint64(0)
 NEVER: Final = np.int32(2**30)
 """A control step later than any."""
-
-
-def _record(*fields: tuple[str, Any]) -> np.dtype[Any]:
-    return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
 _F, _I, _U = np.float32, np.int32, np.uint64
@@ -134,7 +130,7 @@ def _numbers() -> _Numbers:
     return {**numbers, **DERIVED}
 
 
-CONFIG: Final = _record(*((name, kind) for name, (kind, _) in _numbers().items()))
+CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _numbers().items()))
 """The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
 ``_most``), then :data:`DERIVED`."""
 
@@ -198,7 +194,7 @@ def world_record_of(motions: tuple[TargetMotion, ...], metrics: tuple[Metric, ..
             if memory.name in fields:
                 raise motion.error(f"a world has a field {memory.name!r}: choose another name for this memory")
             fields[memory.name] = _F
-    return _record(*fields.items())
+    return record_type(*fields.items())
 
 
 # Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
@@ -269,10 +265,10 @@ class Odometry(NamedTuple):
     unused_3: Lanes
 
 
-FIX_RECORD: Final = _record(*((name, _F) for name in Fix._fields))
+FIX_RECORD: Final = record_type(*((name, _F) for name in Fix._fields))
 """A fix of the target: a position or a bearing, depending on the sensor (:func:`posse.sensor`)."""
 
-TRACKER: Final = _record(
+TRACKER: Final = record_type(
     *((name, _F) for name in Pose._fields),
     ("per_speed", _F),
     ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
@@ -291,18 +287,18 @@ TRACKER: Final = _record(
 )
 """One tracker: :class:`Pose`, :class:`Condition`, its fix and more."""
 
-OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
+OBSTACLE: Final = record_type(("x", _F), ("y", _F), ("radius", _F))
 
-SLOT: Final = _record(("x", _F), ("y", _F))
+SLOT: Final = record_type(("x", _F), ("y", _F))
 """Position of a slot in the slot frame; one table for all worlds."""
 
-HEARD: Final = _record(*((name, _I if name == "step" else _F) for name in Heard._fields))
+HEARD: Final = record_type(*((name, _I if name == "step" else _F) for name in Heard._fields))
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
 
-ODOMETRY: Final = _record(*((name, _F) for name in Odometry._fields))
+ODOMETRY: Final = record_type(*((name, _F) for name in Odometry._fields))
 """The error of a tracker's own pose."""
 
-BROADCAST: Final = _record(
+BROADCAST: Final = record_type(
     ("sent", _I),  # 0: its radio was silent
     *((name, _F) for name in Pose._fields[:6]),
     ("fix_step", _I),
@@ -318,7 +314,7 @@ def _begin(record: np.dtype[Any], name: str) -> int:
     return int(fields[name][1])
 
 
-TARGET_POSE: Final = _begin(_record(*_WORLD), "x")
+TARGET_POSE: Final = _begin(record_type(*_WORLD), "x")
 POSE: Final = _begin(TRACKER, Pose._fields[0])
 CONDITION: Final = _begin(TRACKER, Condition._fields[0])
 FIX: Final = _begin(TRACKER, "fix")
