@@ -48,7 +48,7 @@ _JUDGED: Final = ("safe_score", "score", "contact_free")
 """The first one decides; the others are stated beside it."""
 _MAY_DIFFER: Final = frozenset(
     ("seed", "folder", "steps", "evaluate_every", "evaluate_worlds", "beside", "checkpoint_every", "threads")
-) | {"tensorboard", "wandb", "against", "start"}  # those of a league are the members of its own
+) | {"tensorboard", "wandb", "target", "team", "start"}  # those of a league are the members of its own
 _NOT_PLAYED: Final = {"name", "version", "reward_weights", "target_reward_weights", "message_size"}
 """Fields of a scenario that change no score, or that a check states separately."""
 

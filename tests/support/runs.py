@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -80,6 +81,27 @@ def assert_equal(mine: dict[str, Any], theirs: dict[str, Any]) -> None:
     assert [name for name, value in mine.items() if value != theirs[name]] == []
 
 
+class Killed(BaseException):
+    """Ends a run as a signal does."""
+
+
+@contextmanager
+def killed_at(owner: Any, name: str, call: int) -> Iterator[None]:
+    """Have a function end what calls it at one of its calls, and expect that."""
+    original, calls = getattr(owner, name), [0]
+
+    def dying(*arguments: Any, **named: Any) -> Any:
+        calls[0] += 1
+        if calls[0] == call:
+            raise Killed
+        return original(*arguments, **named)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(owner, name, dying)
+        with pytest.raises(Killed):
+            yield
+
+
 ADVISED: dict[str, Any] = {
     "scenario": "field",
     "advise": "ddcs-distributed",
@@ -100,3 +122,24 @@ GUARDED: dict[str, Any] = {
     "overrides": {"horizon": HORIZON, "settle_time": 1.0},
 }
 """From nothing, behind the safeguard."""
+TARGET: dict[str, Any] = {
+    "scenario": "smart",
+    "side": "target",
+    "encoding": "plain",
+    "team": "ddcs-distributed,idle",
+    "team_sizes": (),
+    "steps": 640,
+    "evaluate_every": 320,
+    "checkpoint_every": 160,
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+    "reward_weights": {"team": -1.0, "contact": -0.5},
+}
+"""Of a target against two teams."""
+AGAINST: dict[str, Any] = {
+    "scenario": "smart",
+    "team": None,
+    "target": "smart,evader",
+    "team_sizes": (),
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+}
+"""Of a team against two targets, of which one is learned."""

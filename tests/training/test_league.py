@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from safetensors.numpy import load_file
-from tests.support.runs import HORIZON, quiet
+from tests.support.runs import HORIZON, killed_at, quiet
 
 from posse_baselines import PolicyError
 from posse_training import league
@@ -63,25 +63,8 @@ def everything(folder: Path) -> dict[str, Any]:
     return found
 
 
-class Killed(BaseException):
-    pass
-
-
-def die_at(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, call: int) -> None:
-    """Have a function end the process, as it were, at one of its calls."""
-    original, calls = getattr(owner, name), [0]
-
-    def dying(*arguments: Any, **named: Any) -> Any:
-        calls[0] += 1
-        if calls[0] == call:
-            raise Killed
-        return original(*arguments, **named)
-
-    monkeypatch.setattr(owner, name, dying)
-
-
 @pytest.mark.long
-def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     found = play_league(tiny(tmp_path / "whole"), console=quiet())
     assert [m.label for m in found.teams] == ["idle", "trackers-1", "trackers-2"]
     assert [m.label for m in found.targets] == ["smart", "target-1", "target-2"]
@@ -90,10 +73,8 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: p
     gained = found.exploited[0]
     assert gained.gain == pytest.approx(gained.before.score.value - gained.after.score.value), "of a target"
     for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
-        with monkeypatch.context() as patched:
-            die_at(patched, owner, name, call)
-            with pytest.raises(Killed):
-                play_league(tiny(tmp_path / "cut"), console=quiet())
+        with killed_at(owner, name, call):
+            play_league(tiny(tmp_path / "cut"), console=quiet())
     play_league(tiny(tmp_path / "cut"), console=quiet())
     assert everything(tmp_path / "cut") == everything(tmp_path / "whole")
 

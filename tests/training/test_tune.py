@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.runs import killed_at
 from tests.support.tunable import BEST, POLICY, quiet, small
 
 from posse_baselines import DDCS, Tunable, tunables
@@ -34,26 +35,11 @@ def test_it_recovers_a_known_optimum(tmp_path: Path) -> None:
     assert card["command"].startswith(f"posse tune {POLICY} --scenario paper-distributed --gen")
 
 
-class Killed(BaseException):
-    """Ends a run as a signal does."""
-
-
 @pytest.mark.parametrize("after", [1, 3])
-def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, after: int) -> None:
     whole = card_of(small(tmp_path / "whole"))
-    generation = _Run._generation
-    made: list[int] = []
-
-    def kill(*arguments: Any) -> Any:
-        if len(made) == after:
-            raise Killed
-        made.append(1)
-        return generation(*arguments)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(_Run, "_generation", kill)
-        with pytest.raises(Killed):
-            tune(small(tmp_path / "killed"), console=quiet())
+    with killed_at(_Run, "_generation", after + 1):
+        tune(small(tmp_path / "killed"), console=quiet())
     assert not (tmp_path / "killed/tuned.json").exists()
     assert card_of(small(tmp_path / "killed")) == whole
 

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.learned import target_for
-from tests.support.runs import HORIZON, assert_equal, numbers, quiet, small
+from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
 from posse_training.errors import CheckpointError, SettingsError
 from posse_training.train import TrainSettings
-from posse_training.train.train import Run, resume, train
+from posse_training.train.train import train
 from posse_training.train.validation import play_all
 from posse_training.train.worlds import make_env
 
@@ -24,22 +23,7 @@ SPLIT = "validation"
 
 
 def target_run(folder: Path, **changes: Any) -> TrainSettings:
-    return small(
-        folder,
-        **{
-            "side": "target",
-            "encoding": "plain",
-            "team": "ddcs-distributed,idle",
-            "scenario": "smart",
-            "team_sizes": (),
-            "steps": 640,
-            "evaluate_every": 320,
-            "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
-            "reward_weights": {"team": -1.0, "contact": -0.5},
-            "checkpoint_every": 160,
-            **changes,
-        },
-    )
+    return small(folder, **{**TARGET, **changes})
 
 
 def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
@@ -52,44 +36,6 @@ def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
     scenario = posse.get_scenario("smart", horizon=HORIZON, num_trackers=3, settle_time=1.0)
     assert evaluate("ddcs-distributed", scenario, 2, target=target, progress=False).episodes == 2
     assert any(name.startswith("/checkpoint/worlds/0.opponent.") for name in numbers(tmp_path / "whole"))
-
-
-class Killed(BaseException):
-    pass
-
-
-@pytest.mark.parametrize("side", ["target", "trackers"])
-def test_a_killed_run_resumes_bit_for_bit(side: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    changes: dict[str, Any] = {}
-    if side == "trackers":
-        file = tmp_path / "evader.safetensors"
-        target_for(posse.get_scenario("smart")).save(file)
-        changes = {
-            "side": "trackers",
-            "encoding": "slots",
-            "team": None,
-            "target": f"smart,{file}",
-            "reward_weights": {},
-            "steps": 1920,
-            "checkpoint_every": 480,
-            "evaluate_every": 960,
-        }
-    train(target_run(tmp_path / "whole", **changes), console=quiet())
-    settings = target_run(tmp_path / "cut", **changes)
-    original, calls = Run._on_rollout_start, [0]
-
-    def dying(self: Run) -> None:
-        calls[0] += 1
-        if calls[0] == 5:
-            raise Killed
-        original(self)
-
-    monkeypatch.setattr(Run, "_on_rollout_start", dying)
-    with pytest.raises(Killed):
-        train(settings, console=quiet())
-    monkeypatch.setattr(Run, "_on_rollout_start", original)
-    resume(tmp_path / "cut", console=quiet())
-    assert_equal(numbers(tmp_path / "cut"), numbers(tmp_path / "whole"))
 
 
 def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
