@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from tests.support.adapters import same
+from tests.support.adapters import play_both
 
 import posse
 from posse_baselines import PolicyError, begin, load
@@ -75,21 +75,5 @@ def test_many_worlds_agree_with_gymnasiums_own_vector_of_single_ones(
     ours = vector(autoreset=mode.name.lower(), **settings)
     makes = [lambda i=i: gymnasium.make(NAME, first_world=i, **settings) for i in range(E)]
     theirs: Any = SyncVectorEnv(makes, autoreset_mode=mode)
-    assert ours.observation_space == theirs.observation_space
-    assert ours.action_space == theirs.action_space
-    assert same(ours.reset(seed=6), theirs.reset(seed=[6] * E))
-    ours.action_space.seed(0)
-    ends = 0
-    for _ in range(40):
-        actions = ours.action_space.sample()
-        mine, other = ours.step(actions), theirs.step(actions)
-        for a, b in zip(mine[:4], other[:4], strict=True):
-            assert a.dtype == b.dtype
-            np.testing.assert_allclose(a, b, rtol=1e-12, atol=0)
-        assert same(mine[4], other[4])
-        ended = mine[2] | mine[3]
-        ends += ended.sum()
-        if mode is AutoresetMode.DISABLED and ended.any():
-            options = {"reset_mask": ended}
-            assert same(ours.reset(options=options), theirs.reset(options={"reset_mask": ended.copy()}))
+    ends = sum(play_both(ours, theirs, mode, 40))
     assert ends >= 2 * E

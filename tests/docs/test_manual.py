@@ -11,10 +11,10 @@ import re
 import subprocess
 import sys
 import tomllib
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from tests.support.html import Tags
 
 import posse
 
@@ -45,18 +45,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-class _Loaded(HTMLParser):
-    """Gathers the addresses of what a page loads by itself, unlike what its links lead to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        named = dict(attrs)
-        address = named.get(LOADED.get(tag, ""))
-        if address and not (tag == "link" and named.get("rel") == "canonical"):
-            self.found.append(address)
+def loaded(page: Path) -> list[str]:
+    """Return the addresses of what a page loads by itself, unlike what its links lead to."""
+    tags = Tags(page.read_text(encoding="utf-8")).tags
+    wanted = [(tag, named) for tag, named in tags if not (tag == "link" and named.get("rel") == "canonical")]
+    return [address for tag, named in wanted if (address := named.get(LOADED.get(tag, "")))]
 
 
 def pages(site: Path) -> list[Path]:
@@ -93,9 +86,7 @@ def test_every_setting_is_in_the_table(site: Path) -> None:
 
 def test_no_page_loads_anything_from_another_host(site: Path) -> None:
     for page in pages(site):
-        loaded = _Loaded()
-        loaded.feed(page.read_text(encoding="utf-8"))
-        assert [a for a in loaded.found if re.match(r"(https?:)?//", a)] == [], page
+        assert [a for a in loaded(page) if re.match(r"(https?:)?//", a)] == [], page
     for style in site.rglob("*.css"):
         text = style.read_text(encoding="utf-8")
         assert re.findall(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//", text) == [], style

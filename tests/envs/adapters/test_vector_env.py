@@ -7,9 +7,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
-from tests.support.adapters import same
+from tests.support.adapters import play_both
 
 from posse.adapters.vector_env import TeamVectorEnv
 
@@ -38,12 +38,6 @@ def vector(name: str = TEAM, **settings: Any) -> TeamVectorEnv:
     return env
 
 
-def reset_where_it_ended(env: VectorEnv[Any, Any, Any], mode: AutoresetMode, ended: Any) -> tuple[Any, Any] | None:
-    if mode is not AutoresetMode.DISABLED or not ended.any():
-        return None
-    return env.reset(options={"reset_mask": ended})
-
-
 @modes
 @names
 @pytest.mark.parametrize("discrete", [False, True])
@@ -61,25 +55,7 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
         ],
         autoreset_mode=mode,
     )
-    assert ours.single_observation_space == theirs.single_observation_space
-    assert ours.single_action_space == theirs.single_action_space
-    assert ours.observation_space == theirs.observation_space
-    assert ours.action_space == theirs.action_space
-    assert same(ours.reset(seed=6), theirs.reset(seed=[6] * E))
-    ours.action_space.seed(0)
-    terminations = truncations = 0
-    for _ in range(80):
-        actions = ours.action_space.sample()
-        mine: Any = ours.step(actions)
-        other: Any = theirs.step(actions)
-        for a, b in zip(mine[:4], other[:4], strict=True):
-            assert a.dtype == b.dtype
-            assert np.allclose(a, b, rtol=1e-12, atol=0)
-        assert same(mine[4], other[4])
-        terminations += mine[2].sum()
-        truncations += mine[3].sum()
-        ended = mine[2] | mine[3]
-        assert same(reset_where_it_ended(ours, mode, ended), reset_where_it_ended(theirs, mode, ended.copy()))
+    terminations, truncations = play_both(ours, theirs, mode, 80)
     assert terminations > 0
     assert truncations > 0
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tests.support.html import Tags
 from tests.support.learned import any_policy
 
 import posse
@@ -24,20 +23,8 @@ from posse_training.style import BOUND, looks_of
 HOSTILE = "</script><script>alert(1)</script><img src onerror>'\"&lt;{{title}}<!--$x$]]>"
 
 
-class Page(HTMLParser):
-    """The tags of a page with their attributes, and its text."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ""
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
+def page_of(found: Comparison) -> Tags:
+    return Tags((found.folder / "report.html").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +35,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
 
 def test_it_holds_all_estimates_and_figures_and_a_hostile_label_is_text(found: Comparison) -> None:
-    page = Page(found.folder / "report.html")
+    page = page_of(found)
     for score in (row["safe_score"] for row in found.rows):
         assert f"{score.value:.3f}[{score.low:.3f}, {score.high:.3f}]" in page.text
     assert [attributes["src"] for tag, attributes in page.tags if tag == "img"] == ["scenarios.svg", "profile.svg"]
@@ -58,7 +45,7 @@ def test_it_holds_all_estimates_and_figures_and_a_hostile_label_is_text(found: C
 
 
 def test_replays_are_of_the_worlds_with_the_largest_differences(found: Comparison) -> None:
-    page = Page(found.folder / "report.html")
+    page = page_of(found)
     files = [str(attributes["href"]) for tag, attributes in page.tags if tag == "a"]
     shown = extremes(found.plays, found.reference, 2)
     assert shown[0].policy == HOSTILE

@@ -5,11 +5,11 @@ from __future__ import annotations
 import html
 import re
 import tomllib
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.html import Tags
 from tests.support.replays import ATTACK, hostile, short
 
 from posse_training.cli import main
@@ -36,29 +36,6 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
         for name, column in theirs.columns.items():
             off = np.abs(mine.columns[name].values - column.values.astype(np.float64))
             assert off.max(initial=0) <= column.resolution * 0.501, name
-
-
-class Tags(HTMLParser):
-    """Every tag with its attributes, and the contents of scripts and style."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.inline: dict[str, str] = {}
-        self._inside: str | None = None
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag in ("script", "style"):
-            self._inside = dict(attrs).get("id") or tag
-
-    def handle_endtag(self, tag: str) -> None:
-        self._inside = None
-
-    def handle_data(self, data: str) -> None:
-        if self._inside:
-            self.inline[self._inside] = self.inline.get(self._inside, "") + data
 
 
 def test_a_page_loads_nothing() -> None:
