@@ -54,11 +54,11 @@ def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
 )
 def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, frame: bool) -> None:
     team = load(policy)
-    batch = posse.batch(scenario, message_size=team.message_size, seed=5, horizon=120)
+    batch = posse.batch(scenario, message_size=team.message_size, seed=5, horizon=250)
     s = batch.scenario
     robots = [deploy(team, Robot(s, i, scale=SCALE)) for i in range(s.num_trackers)]
     observations, memory = batch.reset(), begin(team, batch)
-    for _ in range(s.horizon):
+    for _ in range(120):
         actions, memory = team.act(observations, memory)
         sonar = batch.layout.views(observations[0])["sonar"]
         for i, robot in enumerate(robots):

@@ -25,10 +25,6 @@ class _Still(BasePolicy):
         return np.zeros((worlds, trackers, width), np.float32), memory
 
 
-class Still(_Still):
-    """A valid policy."""
-
-
 class Raises(_Still):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         raise ZeroDivisionError("[bold]by zero[/bold]")
@@ -47,17 +43,6 @@ class Nan(_Still):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         actions, memory = super().act(observations, memory)
         return actions * np.float32(np.nan), memory
-
-
-class WrongShape(_Still):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        actions, memory = super().act(observations, memory)
-        return actions[:, :1], memory
-
-
-class NoActions(_Still):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        return None, memory
 
 
 class Sleeps(_Still):

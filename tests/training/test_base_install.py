@@ -65,7 +65,7 @@ COMPARE = ["compare", "idle", "--scenario", "constant", "--episodes", "2"]
         ["scenarios"],
         ["train", "--help"],
         pytest.param(COMPARE, marks=pytest.mark.long),
-        ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif"],
+        ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif", "--seconds", "1"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],

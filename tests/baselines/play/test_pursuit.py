@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from tests.support.drive import Floats, Instant, complex_of, drive
 
 from posse_baselines import DDCS, Policy, load
+from posse_baselines.ddcs import CONVERGING, FLOCKING
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
 RATIOS = (1.2, 1.5, 2.0, 3.0)
@@ -142,3 +143,30 @@ def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: f
     distance = np.abs(places[:, :, None] - np.array(wedge))
     assert distance.min(axis=1).max() < 0.05
     assert (np.sort(distance.argmin(axis=2), axis=1) == np.arange(5)).all()
+
+
+def test_chase_and_maintenance_change_with_hysteresis() -> None:
+    # One that comes from afar chases until it is 0.15 m too far; one in place that has to turn
+    # round first is left behind by up to 0.8 m, and does not chase.
+    between: list[set[int]] = []
+    for pose in ((-2.4, 0.0, 0.0), (-1.2, 0.0, 2.5)):
+        tasks = set()
+        for now in drive(
+            "velocity-pursuit",
+            "constant",
+            1,
+            60,
+            num_trackers=1,
+            target_speed=0.5,
+            tracker_pose=[pose],
+            target_pose=(0.0, 0.0, 0.0),
+        ):
+            excess, task = abs(now.line_of_sight[0, 0]) - 1.2, int(now.notes["task"][0, 0])
+            if excess < 0.15:
+                assert task == FLOCKING
+            elif excess > 0.8:
+                assert task == CONVERGING
+            elif 0.2 < excess < 0.75:
+                tasks.add(task)
+        between.append(tasks)
+    assert between == [{CONVERGING}, {FLOCKING}]
