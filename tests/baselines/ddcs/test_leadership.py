@@ -72,19 +72,8 @@ def test_a_broken_leader_is_followed_by_the_nearest_that_works() -> None:
 def test_searchers_have_a_leader_and_who_hears_nobody_leads_itself() -> None:
     # Three hear each other, the one in their middle leads; the fourth is out of everybody's reach.
     pose = [(-9.0, -9.0, 0.0), (-9.0, -7.0, 0.0), (-9.0, -5.0, 0.0), (9.0, -9.0, 1.0)]
-    for k, now in enumerate(
-        drive(
-            "pngl-l-phi",
-            "search",
-            3,
-            20,
-            num_trackers=4,
-            tracker_pose=pose,
-            radio_range=6.0,
-            target_pose=(6.0, 6.0, 0.0),
-            start_distance=(4.0, 28.0),
-        )
-    ):
+    start: dict[str, Any] = {"tracker_pose": pose, "target_pose": (6.0, 6.0, 0.0), "start_distance": (4.0, 28.0)}
+    for k, now in enumerate(drive("pngl-l-phi", "search", 3, 20, num_trackers=4, radio_range=6.0, **start)):
         assert (now.notes["task"] == SEARCHING).all()
         leader = now.notes["leader"]
         assert (leader[:, 3] == 3).all()
@@ -97,20 +86,9 @@ def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -
     # Two groups see the target from far sides; each within its own radio range only.
     left = [(-14.0, 0.0, 0.0), (-14.0, 1.0, 0.0)]
     right = [(14.0, 0.0, 3.1), (14.0, 1.0, 3.1), (14.0, -1.0, 3.1)]
-    for k, now in enumerate(
-        drive(
-            "pngl-l-phi",
-            "constant",
-            6,
-            500,
-            radio_range=6.0,
-            radio_loss=0.2,
-            split="train",
-            start_distance=(4.0, 16.0),
-            tracker_pose=[*left, *right],
-            target_pose=(0.0, 0.0, 1.57),
-        )
-    ):
+    start: dict[str, Any] = {"tracker_pose": [*left, *right], "target_pose": (0.0, 0.0, 1.57), "split": "train"}
+    start |= {"start_distance": (4.0, 16.0)}
+    for k, now in enumerate(drive("pngl-l-phi", "constant", 6, 500, radio_range=6.0, radio_loss=0.2, **start)):
         leader = now.notes["leader"]
         if k == 30:
             assert np.isin(leader[:, :2], [0, 1]).all()

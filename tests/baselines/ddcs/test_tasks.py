@@ -76,19 +76,10 @@ def test_who_converges_goes_at_full_speed_and_who_flocks_as_the_formation() -> N
 def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> None:
     # Rule iv of section 3.5: it sees neither the target nor its place, and is told by radio.
     pose = [(-1.2, 0.0, 0.0), (-2.05, 0.85, 0.0), (-11.0, 2.0, 0.3)]
+    start: dict[str, Any] = {"tracker_pose": pose, "target_pose": (0.0, 0.0, 0.0), "start_distance": (1.0, 12.0)}
     for name, task in (("pngl-l-phi", CONVERGING), ("ddcs-no-radio", SEARCHING)):
         far, speeds = [], []
-        for now in drive(
-            name,
-            "constant",
-            1,
-            100,
-            num_trackers=3,
-            tracker_pose=pose,
-            sensing_range=3.0,
-            target_pose=(0.0, 0.0, 0.0),
-            start_distance=(1.0, 12.0),
-        ):
+        for now in drive(name, "constant", 1, 100, num_trackers=3, sensing_range=3.0, **start):
             assert now.notes["task"][0, 2] == task
             far.append(abs(now.line_of_sight[0, 2]))
             speeds.append(now.commands[0, 2, 0])

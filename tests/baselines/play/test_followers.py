@@ -22,6 +22,7 @@ LIMITS: dict[str, Any] = {
     "target_speed": 1.2,
     "num_trackers": 2,
     "start_distance": (0.5, 6.0),
+    "target_pose": (0.0, 0.0, 0.0),
 }
 """Wide enough to avoid limits. In the first step, 0.6 of the own speed is expected of others."""
 WING = 1.2 * math.sqrt(0.5)
@@ -40,20 +41,8 @@ def team(
     """A leader in its slot, and a follower that is ``error`` (m) off its own."""
     leader, follower = -1.2 + 0j, -1.2 + PLACE + error
     start = [(z.real, z.imag, theta * i) for i, z in enumerate((leader, follower))]
-    return list(
-        drive(
-            policy,
-            "constant",
-            1,
-            round(seconds / dt),
-            tracker_pose=start,
-            target_pose=(0.0, 0.0, 0.0),
-            target=target,
-            control_step=dt,
-            physics_step=dt / 2,
-            **LIMITS,
-        )
-    )
+    settings = {**LIMITS, "control_step": dt, "physics_step": dt / 2, "tracker_pose": start}
+    return list(drive(policy, "constant", 1, round(seconds / dt), target=target, **settings))
 
 
 def control_point(now: Instant) -> tuple[complex, float]:
@@ -93,20 +82,9 @@ def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(
 def three(policy: str | Policy, error: complex, dt: float) -> list[Instant]:
     """Three trackers of a wedge in their slots, but the third is ``error`` (m) off its own."""
     places = (-1.2 + 0j, -1.2 + PLACE, -1.2 + PLACE.conjugate() + error)
-    return list(
-        drive(
-            policy,
-            "constant",
-            1,
-            round(2.0 / dt),
-            target=lambda _: (1.2, 0.0),
-            tracker_pose=[(z.real, z.imag, 0.0) for z in places],
-            target_pose=(0.0, 0.0, 0.0),
-            control_step=dt,
-            physics_step=dt / 2,
-            **{**LIMITS, "num_trackers": 3},
-        )
-    )
+    settings = {**LIMITS, "control_step": dt, "physics_step": dt / 2, "num_trackers": 3}
+    settings["tracker_pose"] = [(z.real, z.imag, 0.0) for z in places]
+    return list(drive(policy, "constant", 1, round(2.0 / dt), target=lambda _: (1.2, 0.0), **settings))
 
 
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.003), (0.02, 0.001)])

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from tests.support.drive import Floats, Instant, complex_of, drive
 
-from posse_baselines import DDCS, Policy, load
+from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import CONVERGING, FLOCKING
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
@@ -38,27 +38,11 @@ def intercept_times(policy: str | Policy, k: float, dt: float, general: float = 
     """Times until the range is LAST, one for each aspect, (7,)."""
     tracker = [[(-START * math.cos(a), START * math.sin(a), -general * a)] for a in ASPECTS]
     longest = max(exact_time(k, a, general) for a in ASPECTS)
-    ranges = np.stack(
-        [
-            np.abs(now.line_of_sight[:, 0])
-            for now in drive(
-                policy,
-                "constant",
-                len(ASPECTS),
-                math.ceil(1.1 * longest / dt),
-                tracker_pose=tracker,
-                target_pose=np.zeros((len(ASPECTS), 3)),
-                num_trackers=1,
-                control_step=dt,
-                physics_step=dt / 2,
-                target_speed=1.0 / k,
-                tracker_turn_rate=6.0,
-                formation_distance=0.35,
-                tolerance=0.1,
-                start_distance=(1.0, 10.0),
-            )
-        ]
-    )
+    settings: dict[str, Any] = {"control_step": dt, "physics_step": dt / 2, "target_speed": 1.0 / k, "tolerance": 0.1}
+    settings |= {"tracker_pose": tracker, "target_pose": np.zeros((len(ASPECTS), 3)), "start_distance": (1.0, 10.0)}
+    settings |= {"num_trackers": 1, "tracker_turn_rate": 6.0, "formation_distance": 0.35}
+    seen = drive(policy, "constant", len(ASPECTS), math.ceil(1.1 * longest / dt), **settings)
+    ranges = np.stack([np.abs(now.line_of_sight[:, 0]) for now in seen])
     after = (ranges <= LAST).argmax(axis=0)
     assert (after > 0).all()
     column = np.arange(len(ASPECTS))
@@ -86,18 +70,8 @@ def test_pngl_as_printed_meets_its_target_when_its_equations_say(general: float)
 
 def on_a_circle(policy: str | Policy, seconds: float, rate: float = 0.3) -> list[Instant]:
     """One tracker after a target on a circle of 2 m about (0, 2)."""
-    return list(
-        drive(
-            policy,
-            "constant",
-            1,
-            round(10 * seconds),
-            num_trackers=1,
-            tracker_pose=[(-1.2, -1.0, 0.0)],
-            target_pose=(0.0, 0.0, 0.0),
-            target=lambda _: (0.6, rate),
-        )
-    )
+    start: dict[str, Any] = {"tracker_pose": [(-1.2, -1.0, 0.0)], "target_pose": (0.0, 0.0, 0.0), "num_trackers": 1}
+    return list(drive(policy, "constant", 1, round(10 * seconds), target=lambda _: (0.6, rate), **start))
 
 
 def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> None:
@@ -121,18 +95,8 @@ def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: f
             heading = rng.uniform(-math.pi, math.pi, 5)
             turned = away * np.exp(1j * theta)
             starts.append(np.stack([turned.real, turned.imag, heading], axis=-1))
-    policy = load(name)
-    seen = list(
-        drive(
-            policy,
-            "paper-distributed",
-            worlds,
-            250,
-            tracker_pose=starts,
-            target_pose=np.tile([0.0, 0.0, theta], (worlds, 1)),
-            start_distance=(0.5, 6.0),
-        )
-    )
+    start: dict[str, Any] = {"tracker_pose": starts, "target_pose": np.tile([0.0, 0.0, theta], (worlds, 1))}
+    seen = list(drive(name, "paper-distributed", worlds, 250, start_distance=(0.5, 6.0), **start))
     relative = np.stack([-now.line_of_sight for now in seen])
     settled = np.abs(relative[200:] - relative[-1]).max(axis=(0, 2)) < 0.1
     assert settled.all()
@@ -151,16 +115,8 @@ def test_chase_and_maintenance_change_with_hysteresis() -> None:
     between: list[set[int]] = []
     for pose in ((-2.4, 0.0, 0.0), (-1.2, 0.0, 2.5)):
         tasks = set()
-        for now in drive(
-            "velocity-pursuit",
-            "constant",
-            1,
-            60,
-            num_trackers=1,
-            target_speed=0.5,
-            tracker_pose=[pose],
-            target_pose=(0.0, 0.0, 0.0),
-        ):
+        start: dict[str, Any] = {"tracker_pose": [pose], "target_pose": (0.0, 0.0, 0.0), "num_trackers": 1}
+        for now in drive("velocity-pursuit", "constant", 1, 60, target_speed=0.5, **start):
             excess, task = abs(now.line_of_sight[0, 0]) - 1.2, int(now.notes["task"][0, 0])
             if excess < 0.15:
                 assert task == FLOCKING
