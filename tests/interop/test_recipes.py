@@ -25,18 +25,8 @@ OWN_ENVIRONMENT = dict.fromkeys(
     "recipes",
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
-LONG = {
-    "record_video",
-    "supersuit_vector",
-    "gymnasium_vector",
-    "minari_clone",
-    "sb3_recurrent",
-    "sb3_shared",
-    "sb3_solo",
-    "sb3_team",
-    "torchrl_batch",
-    "torchrl_gym",
-}
+LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", "torchrl_batch", "torchrl_gym"}
+LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
 LONGEST = 15
 LONGER = {"onnx_policy": 20, "robotarium": 50}

@@ -53,19 +53,8 @@ def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     run(sys.executable, "-m", "venv", "--without-pip", folder / "venv", cwd=folder)
     programs = folder / "venv" / "bin"
     wheel = next(built.glob("*.whl"))
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        programs / "python",
-        "install",
-        "--quiet",
-        "-c",
-        ROOT / "constraints.txt",
-        wheel,
-        cwd=folder,
-    )
+    pip = f"-m pip --python {programs / 'python'} install --quiet -c {ROOT / 'constraints.txt'}".split()
+    run(sys.executable, *pip, wheel, cwd=folder)
     return programs
 
 

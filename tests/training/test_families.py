@@ -118,18 +118,8 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
     train(TrainSettings(scenario="family-open", steps=200, folder=tmp_path / "run", overrides=SHORT, **small))
     found = evaluate(str(tmp_path / "run/best.safetensors"), "family-open", 4, progress=False, **SHORT)
     assert found.episodes == 4
-    path = tune(
-        TuneSettings(
-            policy="ddcs-distributed",
-            scenario="family-open",
-            generations=1,
-            population=4,
-            worlds=2,
-            validation_worlds=2,
-            only=("gain",),
-            out=tmp_path / "tuned",
-        )
-    )
+    tuned: dict[str, Any] = {"generations": 1, "population": 4, "worlds": 2, "validation_worlds": 2, "only": ("gain",)}
+    path = tune(TuneSettings(policy="ddcs-distributed", scenario="family-open", out=tmp_path / "tuned", **tuned))
     assert path.is_file()
 
 

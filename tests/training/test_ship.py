@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import shlex
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 import tyro
-from rich.console import Console
 from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
 from scripts.tune_shipped import repeat_all
-from tests.support.runs import HORIZON, quiet, small
+from tests.support.runs import TARGET, quiet, small
 from tests.support.tunable import small as small_tuning
 
 from posse_baselines import load_target
@@ -26,20 +24,7 @@ from posse_training.train.presets import Preset
 from posse_training.train.train import train
 from posse_training.tune import tune
 
-SETTINGS = TrainSettings(
-    scenario="constant",
-    steps=640,
-    num_worlds=4,
-    team_sizes=(2, 3),
-    overrides={"horizon": 40, "settle_time": 1.0},
-    hidden=(8,),
-    minibatch=64,
-    rollout=20,
-    evaluate_every=320,
-    evaluate_worlds=2,
-    beside=None,
-    tensorboard=False,
-)
+SETTINGS = small(Path(), steps=640, team_sizes=(2, 3), hidden=(8,), evaluate_every=320, evaluate_worlds=2)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +33,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
     folder = tmp_path_factory.mktemp("runs")
     for seed in (1, 2, 3):
         settings = replace(SETTINGS, seed=seed, folder=folder / str(seed))
-        train(settings, console=Console(file=StringIO()))
+        train(settings, console=quiet())
     return tuple(folder / str(seed) for seed in (1, 2, 3))
 
 
@@ -56,25 +41,12 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], 
     path = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
     shipped = LearnedPolicy.from_file(path)
     assert shipped.name == "learned-trial"
-    # The expected scores, computed separately.
-    scores = [
-        sum(
-            evaluate(
-                str(run / "best.safetensors"),
-                "constant",
-                10,
-                CHOICE_SEED,
-                split="validation",
-                progress=False,
-                num_trackers=size,
-                horizon=40,
-                settle_time=1.0,
-            )["safe_score"].mean()
-            for size in (2, 3)
-        )
-        / 2
-        for run in runs
-    ]
+    short: dict[str, Any] = {"split": "validation", "horizon": 40, "settle_time": 1.0, "progress": False}
+    scores = []  # computed separately
+    for run in runs:
+        file = str(run / "best.safetensors")
+        played = [evaluate(file, "constant", 10, CHOICE_SEED, num_trackers=size, **short) for size in (2, 3)]
+        scores.append(sum(each["safe_score"].mean() for each in played) / 2)
     recorded = [run["safe_score"]["value"] for run in shipped.card["training_seeds"]]
     assert recorded == pytest.approx(scores)
     assert shipped.card["validation_safe_score"] == pytest.approx(max(scores))
@@ -104,7 +76,7 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
     assert "no run folders given" in refused()
     assert "is not a run folder" in refused(tmp_path)
     other = tmp_path / "other"
-    train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=Console(file=StringIO()))
+    train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=quiet())
     assert "differ in hidden" in refused(runs[0], other)
     assert not list(tmp_path.glob("*.safetensors"))
 
@@ -134,18 +106,8 @@ def test_the_command_on_record_gives_the_settings_again() -> None:
 
 def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = tmp_path / "run"
-    settings = small(
-        run,
-        side="target",
-        encoding="plain",
-        team="idle",
-        scenario="smart",
-        team_sizes=(),
-        steps=80,
-        evaluate_every=80,
-        overrides={"horizon": HORIZON, "settle_time": 1.0},
-        reward_weights={"team": -1.0},
-    )
+    changes = {**TARGET, "team": "idle", "steps": 80, "evaluate_every": 80, "reward_weights": {"team": -1.0}}
+    settings = small(run, **changes)
     train(settings, console=quiet())
     asked = Settings((run,), "mine", worlds=4, out=tmp_path / "out")
     monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", 0.1))

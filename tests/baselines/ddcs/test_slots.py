@@ -32,16 +32,8 @@ def test_trackers_end_in_slots_of_their_own(settings: dict[str, Any]) -> None:
 
 def test_a_large_team_of_which_each_knows_eight_settles() -> None:
     # Team-mates that are no longer in the observation must not stay as obstacles where they were.
-    batch = posse.batch(
-        "constant",
-        10,
-        split="validation",
-        message_size=5,
-        autoreset="disabled",
-        num_trackers=40,
-        num_neighbours=8,
-        formation="rows",
-    )
+    team: dict[str, Any] = {"num_trackers": 40, "num_neighbours": 8, "formation": "rows", "message_size": 5}
+    batch = posse.batch("constant", 10, split="validation", autoreset="disabled", **team)
     metrics = play(batch, load("ddcs-distributed"))
     assert np.isfinite(metrics["settling_time"]).mean() >= 0.9
 

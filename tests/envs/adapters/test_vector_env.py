@@ -15,17 +15,9 @@ from posse.adapters.vector_env import TeamVectorEnv
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
-BUSY: dict[str, Any] = {
-    "scenario": "constant",
-    "horizon": 25,
-    "settle_time": 0.5,
-    "terminate_on_contact": True,
-    "arena": 10.0,
-    "num_obstacles": 2,
-    "obstacle_gap": 0.6,
-    "start_distance": (1.0, 4.0),
-    "obstacle_radius": (0.4, 0.6),
-}
+BUSY: dict[str, Any] = {"scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True}
+BUSY |= {"arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "obstacle_radius": (0.4, 0.6)}
+BUSY |= {"start_distance": (1.0, 4.0)}
 MODES = list(AutoresetMode)
 modes = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 names = pytest.mark.parametrize("name", [TEAM, SOLO])

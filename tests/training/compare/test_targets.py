@@ -54,16 +54,8 @@ def test_a_comparison_plays_every_team_against_the_target(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code = "posse_baselines.policies.simple:Idle"
-    settings = Settings(
-        ("ddcs-distributed", code),
-        ("smart",),
-        episodes=2,
-        out=tmp_path / "out",
-        figures=False,
-        planner_episodes=1,
-        target=str(file),
-    )
-    found = compare(settings)
+    made: dict[str, Any] = {"out": tmp_path / "out", "figures": False, "planner_episodes": 1, "target": str(file)}
+    found = compare(Settings(("ddcs-distributed", code), ("smart",), episodes=2, **made))
     played = {plays.results[0].target for plays in found.plays.values()}
     assert played == {"evading"}
     assert len(found.plays) == 2, "also in the process of a policy that is code"

@@ -267,17 +267,9 @@ def test_a_hostile_page_runs_nothing_and_shows_the_text(browser: Browser, tmp_pa
 def test_the_sensing_area_holds_the_target_when_it_is_seen(
     browser: Browser, tmp_path: Path, view: float, reach: float
 ) -> None:
-    replay = record(
-        ["ddcs-distributed"],
-        "obstacles",
-        seed=2,
-        arena=(26.0, 16.0),
-        num_obstacles=12,
-        obstacle_gap=0.8,
-        field_of_view=view,
-        sensing_range=reach,
-        observations=False,
-    )
+    place: dict[str, Any] = {"arena": (26.0, 16.0), "num_obstacles": 12, "obstacle_gap": 0.8, "observations": False}
+    sight = {"field_of_view": view, "sensing_range": reach}
+    replay = record(["ddcs-distributed"], "obstacles", seed=2, **place, **sight)
     sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=0") as page:
         inside = page.evaluate("""() => {
