@@ -191,8 +191,8 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
 def started(case: int) -> tuple[posse.Batch, npt.NDArray[np.float32]]:
     """Start an episode that is short, and from starts nearby, so that much happens."""
     name, changes = CASES[case]
-    near: dict[str, Any] = {"horizon": 160, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0}
-    batch = posse.batch(name, 1, seed=8, **near, **changes)
+    short: dict[str, Any] = {"horizon": 160, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0}
+    batch = posse.batch(name, 1, seed=8, **short, **changes)
     return batch, batch.reset(seed=8)
 
 

@@ -147,6 +147,7 @@ def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
         assert last["metrics/duration"] == pytest.approx(0.4)
 
 
+@pytest.mark.long
 def test_torchrl_starts_processes_of_its_own() -> None:
     envs = GymEnv("posse:posse/Team-v0", num_envs=2, scenario="smart", horizon=4)
     check_env_specs(envs)

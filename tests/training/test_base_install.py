@@ -6,20 +6,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.support.process import python
+from tests.support.forks import forks_of
 
-EXTRA = (
-    "torch",
-    "stable_baselines3",
-    "sb3_contrib",
-    "tensordict",
-    "torchrl",
-    "tensorboard",
-    "moviepy",
-    "wandb",
-    "minari",
-    "onnx",
-)
+EXTRA: tuple[str, ...] = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "wandb")
+EXTRA += ("minari", "moviepy", "onnx")
 BLOCKED = f"""
 import sys
 
@@ -34,7 +24,7 @@ sys.meta_path.insert(0, Blocker())
 
 def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run code in a process in which no package of an extra can be imported."""
-    return python("-c", f"{BLOCKED}\n{code}", *arguments, cwd=cwd)
+    return forks_of("posse").run(f"{BLOCKED}\nsys.argv[1:] = {arguments!r}\n{code}", cwd)
 
 
 MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"

@@ -268,7 +268,7 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
     browser: Browser, tmp_path: Path, view: float, reach: float
 ) -> None:
     place: dict[str, Any] = {"arena": (26.0, 16.0), "num_obstacles": 12, "obstacle_gap": 0.8, "observations": False}
-    sight = {"field_of_view": view, "sensing_range": reach}
+    sight: dict[str, Any] = {"field_of_view": view, "sensing_range": reach}
     replay = record(["ddcs-distributed"], "obstacles", seed=2, **place, **sight)
     sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=0") as page:
