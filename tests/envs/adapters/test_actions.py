@@ -1,4 +1,4 @@
-"""Actions of every supported form are read correctly, and others are refused or clipped."""
+"""Actions of every supported form are read correctly, others are refused or clipped; all kinds play one world."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from tests.support.adapters import same
+from tests.support.adapters import part, same
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
@@ -89,3 +89,25 @@ def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kin
         for env in (rounded, clipping):
             with pytest.raises(ValueError, match=r"(nan|inf) is not a number in \[-1, 1\]"):
                 env.step(actions(np.where(bounds > 0, bad, np.float32(0.5))))
+
+
+@pytest.mark.parametrize("kind", ["parallel", "team", "solo"])
+def test_an_environment_is_the_first_world_of_a_batch(kind: str) -> None:
+    make, actions = KINDS[kind]
+    env = make(split="test", first_world=5)
+    batch = posse.batch("smart", 2, split="test", first_world=5, num_trackers=1 if kind == "solo" else 3)
+    seen, rows, rng = env.reset(seed=9)[0], batch.reset(seed=9), np.random.default_rng(0)
+    for _ in range(30):
+        mine = list(seen.values()) if kind == "parallel" else np.reshape(seen, rows[0].shape)
+        np.testing.assert_array_equal(mine, rows[0])
+        drawn = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+        seen, reward, *_, info = env.step(actions(drawn[0]))
+        rows, rewards, *_, told = batch.step(drawn)
+        if kind == "parallel":
+            assert list(reward.values()) == rewards[0].tolist()
+        else:
+            assert reward == pytest.approx(rewards[0].mean(), rel=1e-5, abs=1e-6)
+        info = info["tracker_0"] if kind == "parallel" else info
+        assert info["score"] == told["score"][0]
+        for name, values in part(told, "reward/").items():
+            np.testing.assert_array_equal(info[f"reward/{name}"], values[0] if kind == "team" else values[0, 0])

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from tests.support.adapters import f32, part
+from tests.support.adapters import f32
 
 import posse
 
@@ -24,37 +24,6 @@ def _no_window(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", [TEAM, SOLO])
 def test_gymnasium_finds_the_drawing_sound(name: str) -> None:
     check_env(gymnasium.make(name, scenario="smart").unwrapped)
-
-
-def test_a_team_is_the_first_world_of_a_batch() -> None:
-    env = gymnasium.make(TEAM, scenario="field", split="validation", first_world=5)
-    batch = posse.batch("field", 3, split="validation", first_world=5)
-    observation, _ = env.reset(seed=9)
-    batch_observations = batch.reset(seed=9)
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        assert np.array_equal(observation, batch_observations[0])
-        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-        observation, reward, _, _, info = env.step(actions[0])
-        batch_observations, rewards, _, _, infos = batch.step(actions)
-        assert reward == pytest.approx(rewards[0].mean(), rel=1e-5, abs=1e-6)
-        assert info["score"] == infos["score"][0]
-        for term, values in part(infos, "reward/").items():
-            assert np.array_equal(info[f"reward/{term}"], values[0])
-
-
-def test_a_solo_is_a_team_of_one() -> None:
-    solo = gymnasium.make(SOLO, scenario="smart")
-    team = gymnasium.make(TEAM, scenario="smart", num_trackers=1)
-    ours, theirs = solo.reset(seed=3)[0], team.reset(seed=3)[0]
-    for k in range(30):
-        assert np.array_equal(ours, theirs[0])
-        action = f32([np.cos(k), np.sin(k)])
-        ours, reward, _, _, info = solo.step(action)
-        theirs, team_reward, _, _, team_info = team.step(action[None])
-        assert reward == team_reward
-        for term, value in part(info, "reward/").items():
-            assert value == team_info[f"reward/{term}"][0]
 
 
 def test_without_a_seed_environments_differ() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pettingzoo
 import pytest
 from pettingzoo.test import render_test
-from tests.support.adapters import f32, part
+from tests.support.adapters import f32
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -21,26 +21,6 @@ def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     assert env.render() is None
     env.close()
     env.close()
-
-
-def test_an_environment_is_the_first_world_of_a_batch() -> None:
-    for first_world in (0, 3):
-        env = posse.parallel_env("field", split="test", first_world=first_world)
-        batch = posse.batch("field", 2, seed=11, split="test", first_world=first_world)
-        ours, theirs = env.reset(seed=11)[0], batch.reset()
-        rng = np.random.default_rng(0)
-        for _ in range(30):
-            for i, agent in enumerate(env.agents):
-                assert np.array_equal(ours[agent], theirs[0, i])
-            actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-            ours, rewards, *_, infos = env.step(dict(zip(env.agents, actions[0], strict=True)))
-            theirs, batch_rewards, _, _, batch_infos = batch.step(actions)
-            assert list(rewards.values()) == batch_rewards[0].tolist()
-            for i, agent in enumerate(env.agents):
-                info = infos[agent]
-                assert info["score"] == batch_infos["score"][0]
-                for name, values in part(batch_infos, "reward/").items():
-                    assert info[f"reward/{name}"] == values[0, i]
 
 
 def test_a_discrete_action_is_one_of_the_motions() -> None:
