@@ -128,7 +128,7 @@ def test_one_agent(name: str, variant: str) -> None:
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
-    settings: Settings = {"scenario": "leader-loss", "horizon": 4, "autoreset": autoreset}
+    settings: Settings = {"scenario": "leader-loss", "horizon": 4, "autoreset": autoreset, "break_window": (0.5, 0.5)}
     batch = posse.batch(num_worlds=3, **settings)
     batch.reset()
     infos = [batch.step(np.zeros(batch.action_shape))[-1] for _ in range(4)]
@@ -136,6 +136,7 @@ def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
     assert all(types_of(info) == types_of(infos[0]) for info in infos)
     assert all((info["metrics/duration"] == 0).all() for info in infos[:-1])
     assert infos[-1]["metrics/duration"] == pytest.approx(0.4)
+    assert [info["working"].sum(axis=1).tolist() for info in infos] == [[5] * 3] * 2 + [[4] * 3] * 2
     with pytest.raises(ValueError, match="read-only"):
         infos[0]["metrics/duration"][0] = 1.0
     for name in ("Team", "Tracker"):

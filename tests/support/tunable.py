@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from posse.numeric import FloatArray
 from posse_baselines import Memory
@@ -68,10 +66,6 @@ def small(out: Path, **changes: Any) -> TuneSettings:
         "every": 2,
     }
     return TuneSettings(**(values | changes))
-
-
-def quiet() -> Console:
-    return Console(file=StringIO())
 
 
 class WithoutEffect(Biased):

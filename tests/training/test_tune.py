@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.runs import killed_at
-from tests.support.tunable import BEST, POLICY, quiet, small
+from tests.support.runs import killed_at, quiet
+from tests.support.tunable import BEST, POLICY, small
 
 from posse_baselines import DDCS, Tunable, tunables
 from posse_training.cli import main
