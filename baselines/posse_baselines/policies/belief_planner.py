@@ -21,6 +21,7 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
+from posse_baselines.laws.offsets import unit_of
 from posse_baselines.policies.planner.policy import PlannerSettings, Search
 from posse_baselines.policy import Annotations, Memory, check_observations
 from posse_baselines.tuned import TunedDDCS
@@ -246,7 +247,12 @@ class Beliefs(OwnArrays):
         if s.target_is_agent:
             speed = np.clip(np.abs(velocity), s.target_least_speed, s.target_speed)
         goal = _complex(np.stack([w["goal_cos"], w["goal_sin"]], axis=-1))
-        unforeseen = first | (np.abs(surprise) > _AGREES)
+        noise = self.layout.scenario.heading_noise
+        unforeseen = first | (np.abs(surprise) > max(_AGREES, 3.0 * noise))
+        if noise > 0.0:  # no turn rate can be measured, and only what is far from foreseen says anything
+            theta = np.where(unforeseen, theta, theta * np.exp(1j * (self.settings.fix_trust - 1.0) * surprise))
+            frame = frame * np.exp(1j * (np.angle(theta) - angle))
+            turn, angle = np.where(unforeseen, np.sign(surprise) * s.target_turn_rate, w["turn_rate"]), np.angle(theta)
         if s.target_motion == "smart":
             turning = np.abs(turn) > _TURNS * s.target_turn_rate
             goal = np.where(unforeseen, theta * np.exp(1j * np.where(turning, np.sign(turn), 0.0)), goal)
@@ -351,8 +357,11 @@ class BeliefPlanner(DDCS):
         actions = beliefs.act(observations, self._working(minds)).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
+        # Plans make up for the lag of commands, and so does what carries them out.
+        made_up = 1.0 + minds.team.settings["foresight"][0] * (1.0 / minds.team.world["followed"][0] - 1.0)
+        speed, omega = (old + (new - old) / made_up for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
-        wish = mine["wish_x"] + 1j * mine["wish_y"]
+        wish = (mine["wish_x"] + 1j * mine["wish_y"]) / unit_of(memory.layout.scenario)
         wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])
