@@ -59,7 +59,7 @@ class BeliefSettings:
     plan: PlannerSettings = field(default_factory=PlannerSettings)
     """How far it plays ahead, and what it tries."""
     fix_trust: float = number(0.3, "", 0.01, 1.0)
-    """Share of the difference between a noisy fix and the believed position that is corrected."""
+    """Share of the difference between a noisy fix and the believed position or heading that is corrected."""
     lost_after: float = number(2.0, "s", 0.0, 100.0)
     """Age of a fix up to which the planned motion is played, then the script's."""
 
