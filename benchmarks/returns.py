@@ -17,7 +17,7 @@ def correlations(policy_name: str, scenario: str, worlds: int = 300) -> tuple[fl
     batch = posse.batch(scenario, worlds, seed=3, split="test", message_size=policy.message_size)
     played = rollout(batch, policy, ["rewards", *CONTACTS])
     rewards = played["rewards"].mean(axis=-1)
-    before = sum(played[name] for name in CONTACTS)[:-1] == 0
+    before = np.stack([played[name] for name in CONTACTS]).sum(axis=0)[:-1] == 0
     safe = played.metrics["safe_score"]
     until, whole = (np.corrcoef(r.sum(axis=0), safe)[0, 1] for r in (np.where(before, rewards, 0.0), rewards))
     return float(until), float(whole)
