@@ -23,16 +23,13 @@ import standings
 from equations import typeset
 
 PARTS: Final[dict[str, Callable[..., str]]] = {
-    "scenarios": declared_tables.scenarios,
-    "settings": declared_tables.settings,
+    "scenario": replays.scenario,
     "all_settings": declared_tables.all_settings,
-    "observation_fields": declared_tables.observation_fields,
+    "observation": declared_tables.observation,
     "metrics": declared_tables.metrics,
     "training_defaults": declared_tables.training_defaults,
     "reward_terms": declared_tables.reward_terms,
     "replay": replays.replay,
-    "gallery": standings.gallery,
-    "scores": standings.scores,
     "leaderboard": standings.leaderboard,
     "results": standings.results,
     "training_seeds": standings.training_seeds,
@@ -40,6 +37,7 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "peers": standings.peers,
     "notebook": notebook_page.notebook,
 }
+_NAME: Final = re.compile(r"<code>([^<\s]{1,40})</code>")
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
 
 
@@ -50,8 +48,8 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Typeset the equations of a page."""
-    return typeset(html)
+    """Typeset the equations of a page, and keep names in one piece."""
+    return typeset(_NAME.sub(r'<code class="name">\1</code>', html))
 
 
 def on_post_build(config: MkDocsConfig, **_: Any) -> None:

@@ -19,18 +19,6 @@ from posse_training.leaderboard import WORLDS, Standing, read_standings
 RESULTS: Final = Path(__file__).parents[2] / "benchmarks"
 STANDINGS: Final = RESULTS / "standings.csv"
 SCENARIOS: Final = tuple(n for n in posse.scenario_names() if not n.startswith("paper"))
-SUMMARY: Final = {
-    "constant": "a target that runs straight on",
-    "accelerating": "a target that weaves",
-    "smart": "an evader, slower and more agile than the trackers",
-    "search": "find the target first, with short sight",
-    "obstacles": "discs block paths and the view",
-    "radio": "messages are late and get lost",
-    "leader-loss": "the only one that sees the target breaks",
-    "field": "all of it at once, with noise",
-    "duel": "a target that may have learned to escape",
-    "robots": "TurtleBots: poses drift, commands act late",
-}
 
 
 @functools.cache
@@ -50,30 +38,6 @@ def of_scenario(scenario: str) -> list[Standing]:
     mine = [row for row in standings(STANDINGS) if row.scenario == scenario]
     ranked = [row for row in mine if not row.reads_state and row.worlds >= WORLDS]
     return [row for row in mine if row.reads_state] + ranked
-
-
-def gallery() -> str:
-    """Return a card for each scenario: picture, name, what it is about."""
-    cards = [
-        f'- <a href="site:scenarios/{name}/"><img src="site:media/scenarios/{name}.png" '
-        f'alt="A team on {name}" loading="lazy"></a>\n\n'
-        f'    <a href="site:scenarios/{name}/"><strong>{name}</strong></a>: {SUMMARY[name]}\n'
-        for name in SCENARIOS
-    ]
-    return '<div class="cards" markdown>\n\n' + "\n".join(cards) + "\n</div>\n"
-
-
-def scores(scenario: str) -> str:
-    """Return a table of who scores what on a scenario."""
-    mine = of_scenario(scenario)
-    if not mine:
-        return "No results of this version yet: `make results` makes them.\n"
-    best = max((row.safe_score for row in mine if row.reads_state), default=None)
-    rows = []
-    for row in mine:
-        of_planner = "" if best is None or row.reads_state else f"{row.safe_score / best:.2f}"
-        rows.append((_name(row), _score(row), of_planner, f"{row.contact_free:.1%}"))
-    return table(("team", "safe score [95 %]", "of the planner's", "contact-free"), rows)
 
 
 def leaderboard() -> str:
