@@ -17,7 +17,6 @@ from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 
 import declared_tables
-import notebook_page
 import replays
 import standings
 from equations import typeset
@@ -35,7 +34,6 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "training_seeds": standings.training_seeds,
     "algorithms": standings.algorithms,
     "peers": standings.peers,
-    "notebook": notebook_page.notebook,
 }
 _NAME: Final = re.compile(r"<code>([^<\s]{1,40})</code>")
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)

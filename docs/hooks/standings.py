@@ -103,8 +103,7 @@ def peers() -> str:
     for name, threads in dict.fromkeys((run["simulator"], run["threads"]) for run in runs):
         cells = [found.get((name, threads, batch)) for batch in batches]
         rows.append((name, threads, *("" if c is None else f"{float(c['agent_steps']) / 1e6:.3g}" for c in cells)))
-    made = f"{runs[0]['machine']}, commit {code(runs[0]['commit'])}.\n\n"
-    return made + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
+    return f"{runs[0]['machine']}.\n\n" + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
 
 
 def _rows(name: str) -> Sequence[dict[str, str]]:

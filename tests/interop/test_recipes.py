@@ -67,5 +67,5 @@ def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
 def test_it_is_short_and_on_the_page(name: str) -> None:
     lines = (RECIPES / f"{name}.py").read_text(encoding="utf-8").splitlines()
     assert len([line for line in lines if line.strip()]) <= LONGER.get(name, LONGEST)
-    pages = [(ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("use_with.md", "robots.md")]
+    pages = [(ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("use_with.md", "robots.md", "add_policy.md")]
     assert any(f'--8<-- "docs/recipes/{name}.py"' in page for page in pages)

@@ -118,7 +118,7 @@ def test_cleanrl_ppo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 
 def test_every_tutorial_is_tried_and_has_its_place_in_the_manual() -> None:
     tests = Path(__file__).read_text()
-    page = (ROOT / "docs" / "tutorials" / "index.md").read_text()
+    page = "".join((ROOT / "docs" / name).read_text() for name in ("tutorials/index.md", "add_policy.md"))
     elsewhere = {"notebook.ipynb", "step_loop.py"}  # tests/docs/test_notebook.py
     names = {path.name for path in TUTORIALS.iterdir() if path.suffix != ".md"}
     files = sorted(names - elsewhere)
