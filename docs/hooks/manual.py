@@ -33,6 +33,8 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "results": standings.results,
     "training_seeds": standings.training_seeds,
     "algorithms": standings.algorithms,
+    "duel_script": standings.duel_script,
+    "duel_leagues": standings.duel_leagues,
     "peers": standings.peers,
 }
 _NAME: Final = re.compile(r"<code>([^<\s]{1,40})</code>")

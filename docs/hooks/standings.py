@@ -18,6 +18,8 @@ from posse_training.leaderboard import WORLDS, Standing, read_standings
 
 RESULTS: Final = Path(__file__).parents[2] / "benchmarks"
 STANDINGS: Final = RESULTS / "standings.csv"
+LEAGUES: Final = tuple(sorted((RESULTS / "league").glob("*.csv")))
+"""The matrix of a league of `duel` for each seed, as ``posse league`` writes it."""
 SCENARIOS: Final = tuple(n for n in posse.scenario_names() if not n.startswith("paper"))
 
 
@@ -80,7 +82,7 @@ def training_seeds() -> str:
 
 def algorithms() -> str:
     """Return what algorithms reach from nothing: the mean of their training seeds, and their range."""
-    runs = _rows("algorithms.csv")
+    runs = _rows(RESULTS / "algorithms.csv")
     rows = []
     for scenario, name in sorted({(run["scenario"], run["algorithm"]) for run in runs}):
         mine = [run for run in runs if (run["scenario"], run["algorithm"]) == (scenario, name)]
@@ -94,9 +96,40 @@ def algorithms() -> str:
     return table(header, rows)
 
 
+def duel_script() -> str:
+    """Return what the tuned script scores in `duel` against scripted targets and those that read nothing."""
+    found = _league(LEAGUES[0])
+    names = [target for team, target in found if team == "ddcs-tuned" and not target.startswith("target-")]
+    rows = []
+    for name in names:
+        run = found["ddcs-tuned", name]
+        share = f"{1 - float(run['contact_free']):.1%}"
+        rows.append((code(name), f"{float(run['safe_score']):.3f}", f"{float(run['score']):.3f}", share))
+    return table(("target", "safe score", "score", "worlds with contact"), rows)
+
+
+def duel_leagues() -> str:
+    """Return what the script and the last team of each league score against its targets."""
+    rows = []
+    for path in LEAGUES:
+        found = {pair: float(run["safe_score"]) for pair, run in _league(path).items()}
+        for team in ("ddcs-tuned", "trackers-6"):
+            of = {target: score for (each, target), score in found.items() if each == team}
+            worst = min(of, key=lambda name: of[name])
+            shown = (f"{of[name]:.3f}" for name in ("smart", "target-1", "target-6"))
+            rows.append((path.stem, code(team), *shown, f"{of[worst]:.3f}, {code(worst)}"))
+    targets = (code(name) for name in ("smart", "target-1", "target-6"))
+    return table(("seed", "team", *targets, "lowest, and against whom"), rows)
+
+
+def _league(path: Path) -> dict[tuple[str, str], dict[str, str]]:
+    """Return the rows of a league's matrix by team and target."""
+    return {(run["team"], run["target"]): run for run in _rows(path)}
+
+
 def peers() -> str:
     """Return the throughput of simulators by number of worlds, million agent-steps/s."""
-    runs = _rows("peers.csv")
+    runs = _rows(RESULTS / "peers.csv")
     batches = sorted({int(run["worlds"]) for run in runs})
     found = {(run["simulator"], run["threads"], int(run["worlds"])): run for run in runs}
     rows = []
@@ -106,8 +139,8 @@ def peers() -> str:
     return f"{runs[0]['machine']}.\n\n" + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
 
 
-def _rows(name: str) -> Sequence[dict[str, str]]:
-    with (RESULTS / name).open(newline="", encoding="utf-8") as file:
+def _rows(path: Path) -> Sequence[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -35,6 +35,7 @@ sys.exit(main(sys.argv[1:]))
 
 def shell_lines(text: str) -> list[str]:
     """Return the commands of a block, or none if it is no shell's."""
+    text = text.replace("\\\n", " ")
     lines = [line.removeprefix("$ ").partition("  #")[0].strip() for line in text.splitlines() if line.strip()]
     return lines if lines and all(line.startswith(PROGRAMS) for line in lines) else []
 
