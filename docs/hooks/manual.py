@@ -21,6 +21,19 @@ import replays
 import standings
 from equations import typeset
 
+ROOT: Final = Path(__file__).parents[2]
+
+
+def bibtex() -> str:
+    """Return how to cite posse, as the README has it."""
+    return (ROOT / "README.md").read_text(encoding="utf-8").partition("## Cite\n")[2].strip()
+
+
+def contributing() -> str:
+    """Return CONTRIBUTING.md, whose links lead to pages here."""
+    return (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").replace("](docs/", "](")
+
+
 PARTS: Final[dict[str, Callable[..., str]]] = {
     "scenario": replays.scenario,
     "all_settings": declared_tables.all_settings,
@@ -33,6 +46,8 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "results": standings.results,
     "training_seeds": standings.training_seeds,
     "algorithms": standings.algorithms,
+    "bibtex": bibtex,
+    "contributing": contributing,
     "duel_script": standings.duel_script,
     "duel_leagues": standings.duel_leagues,
     "peers": standings.peers,

@@ -1,6 +1,7 @@
 """Every command of the README and the manual's pages runs, read from the pages themselves.
 
-A page is followed from top to bottom in an empty folder, its Python and its shell, with the smallest budgets.
+A page is followed from top to bottom in an empty folder, its Python and its shell, with the smallest budgets; commands
+on Ray only where it is installed, since ``tests/training/cluster`` has them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ NOT_RUN = {
     "ray start": "it starts a cluster that outlives the test: tests/training/cluster has one of two nodes",
     "ray stop": "it stops every cluster of this machine",
     "10.0.0.1": "the address of another machine",
-    "...": "what the dots stand for is elsewhere on the page",
     "class Tracker(Node)": "a listing for ROS 2, which is no Python package",
 }
 """Parts of commands and Python that are not run, and why not."""
@@ -61,15 +61,12 @@ FOLLOWED = [page for page in sorted(PAGES) if any("--8<--" not in text for _, _,
 @pytest.mark.long
 @pytest.mark.parametrize("page", FOLLOWED)
 def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
-    script, python = script_of(page, NOT_RUN, SHORTER, GIVEN), Path(sys.executable)
-    if re.search("--ray|ray=", script) and importlib.util.find_spec("ray") is None:
-        python = ROOT / ".venv-recipes" / "bin" / "python"
-        if not python.exists():
-            pytest.skip("needs Ray: make recipes")
+    no_ray = importlib.util.find_spec("ray") is None
+    script = script_of(page, [*NOT_RUN, *["--ray"] * no_ray], SHORTER, GIVEN)
     (tmp_path / "page.py").write_text(script, encoding="utf-8")
     paths = [str(tmp_path), str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
     done = subprocess.run(
-        [str(python), "page.py"],
+        [sys.executable, "page.py"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
