@@ -52,7 +52,10 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "duel_leagues": standings.duel_leagues,
     "peers": standings.peers,
 }
-_NAME: Final = re.compile(r"<code>([^<\s]{1,40})</code>")
+_NAME: Final = re.compile(r"<code>([^<\n]{1,36})</code>")
+_CELL: Final = re.compile(r"<td>(.*?)</td>", re.DOTALL)
+_LONG: Final = 24
+"""Letters from which a cell of a table keeps some width on a phone."""
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
 
 
@@ -63,8 +66,12 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Typeset the equations of a page, and keep names in one piece."""
-    return typeset(_NAME.sub(r'<code class="name">\1</code>', html))
+    """Typeset the equations of a page, keep names in one piece, and mark long cells of tables."""
+    return typeset(_CELL.sub(_marked, _NAME.sub(r'<code class="name">\1</code>', html)))
+
+
+def _marked(found: re.Match[str]) -> str:
+    return f'<td class="long">{found[1]}</td>' if len(re.sub("<.*?>", "", found[1])) >= _LONG else found[0]
 
 
 def on_post_build(config: MkDocsConfig, **_: Any) -> None:

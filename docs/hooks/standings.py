@@ -53,7 +53,9 @@ def leaderboard() -> str:
             worlds = (f"{row.worlds:,}", row.seed, code(row.commit[:7]))
             rows.append((place, _name(row), _score(row), f"{row.contact_free:.1%}", *worlds))
         header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit")
-        parts.append(f"### {scenario}\n\n" + (table(header, rows) if rows else "No results yet.\n"))
+        best = next((f"{row[1]} {row[2]}" for row in rows if row[0] == 1), "No results yet")
+        summary = f"<summary markdown='span'>{best}</summary>"
+        parts.append(f"### {scenario}\n\n<details markdown>{summary}\n\n{table(header, rows)}\n</details>\n")
     return "\n".join(parts)
 
 
