@@ -46,7 +46,7 @@ def training_defaults() -> str:
         if chosen["advise"] is None:
             shown["correction"] = ""
         rows.append((code(scenario), f"{chosen['steps']:,}", *(shown[name] for name in names[1:])))
-    return table(("scenario", *(f"--{name.replace('_', '-')}" for name in names)), rows)
+    return table(("scenario", *(code(f"--{name.replace('_', '-')}") for name in names)), rows)
 
 
 def changed_settings(scenario: str) -> str:

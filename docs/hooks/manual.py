@@ -52,7 +52,9 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "duel_leagues": standings.duel_leagues,
     "peers": standings.peers,
 }
-_NAME: Final = re.compile(r"<code>([^<\n]{1,36})</code>")
+_CODE: Final = re.compile(r"<code>([^<\n]+)</code>")
+_WORD: Final = re.compile(r"(?<!\S)\S{1,36}(?!\S)")
+"""What stays in one piece, if it is not wider than a phone."""
 _CELL: Final = re.compile(r"<td>(.*?)</td>", re.DOTALL)
 _LONG: Final = 24
 """Letters from which a cell of a table keeps some width on a phone."""
@@ -67,7 +69,13 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 def on_page_content(html: str, **_: Any) -> str:
     """Typeset the equations of a page, keep names in one piece, and mark long cells of tables."""
-    return typeset(_CELL.sub(_marked, _NAME.sub(r'<code class="name">\1</code>', html)))
+    return typeset(_CELL.sub(_marked, _CODE.sub(_in_pieces, html)))
+
+
+def _in_pieces(found: re.Match[str]) -> str:
+    if len(found[1]) <= 36:
+        return f'<code class="name">{found[1]}</code>'
+    return "<code>" + _WORD.sub(r'<span class="name">\g<0></span>', found[1]) + "</code>"
 
 
 def _marked(found: re.Match[str]) -> str:
