@@ -46,28 +46,18 @@ def training_defaults() -> str:
         if chosen["advise"] is None:
             shown["correction"] = ""
         rows.append((code(scenario), f"{chosen['steps']:,}", *(shown[name] for name in names[1:])))
-    return table(("scenario", *(f"--{name.replace('_', '-')}" for name in names)), rows)
+    return table(("scenario", *(code(f"--{name.replace('_', '-')}") for name in names)), rows)
 
 
-def scenarios() -> str:
-    """Return every named scenario with its version and meaning."""
-    named = map(posse.get_scenario, posse.scenario_names())
-    return table(("scenario", "version", "meaning"), ((code(s.name), s.version, s.meaning) for s in named))
-
-
-def settings(scenario: str) -> str:
-    """Return the settings of a named scenario that differ from the defaults."""
+def changed_settings(scenario: str) -> str:
+    """Return the settings of a named scenario that differ from the defaults, as a user writes them."""
     own, plain = posse.get_scenario(scenario), posse.Scenario(name="plain")
-    rows = []
+    found = []
     for field in dataclasses.fields(own):
         given, default = getattr(own, field.name), getattr(plain, field.name)
-        if field.name in ("name", "meaning") or given == default:
-            continue
-        setting = own.settings()[field.name]
-        rows.append((code(field.name), code(value(given)), code(value(default)), setting.unit, setting.meaning))
-    if not rows:
-        return "All settings have their defaults.\n"
-    return table(("setting", "here", "default", "unit", "meaning"), rows)
+        if field.name not in ("name", "version", "meaning") and given != default:
+            found.append(code(f"{field.name}={value(given)}"))
+    return ", ".join(found)
 
 
 def value(given: object) -> str:
@@ -79,20 +69,23 @@ def value(given: object) -> str:
     return f"{given:g}" if isinstance(given, float) else repr(given)
 
 
-def observation_fields(scenario: str) -> str:
-    """Return the fields of a scenario's observation."""
-    rows = [
-        (
-            code(field.name) + (" (of each team-mate)" if field.of_neighbour else ""),
-            field.size,
-            field.unit,
-            f"[{field.low:.4g}, {field.high:.4g}]",
-            "" if field.unknown is None else f"{field.unknown:g}",
-            field.meaning,
-        )
-        for field in posse.observation_fields(scenario)
-    ]
-    return table(("field", "numbers", "unit", "range", "unknown", "meaning"), rows)
+def observation(scenario: str) -> str:
+    """Return the fields of a scenario's observation in their order, with their indices."""
+    layout = posse.ObservationLayout(posse.get_scenario(scenario))
+    rows = []
+    for field in layout.fields:
+        first = layout.offsets[field.name]
+        indices = f"{first}" if field.size == 1 else f"{first}:{first + field.size}"
+        if field.of_neighbour:
+            indices += f"&nbsp;+&nbsp;{layout.stride}k"
+        bounds = f"{field.low:.4g} to {field.high:.4g}".replace("-", "\N{MINUS SIGN}").replace(" ", "&nbsp;")
+        unknown = "" if field.unknown is None else f"{field.unknown:g}"
+        rows.append((indices, code(field.name), field.unit, bounds, unknown, field.meaning))
+    note = (
+        f"The vector has {layout.size} numbers. Indices are Python's, a:b without b; k is the place of a team-mate, "
+        f"0 to {layout.neighbours - 1}, nearest first.\n\n"
+    )
+    return note + table(("index", "field", "unit", "range", "unknown", "meaning"), rows)
 
 
 def metrics() -> str:
@@ -102,6 +95,7 @@ def metrics() -> str:
 
 
 def reward_terms() -> str:
-    """Return the terms of the reward."""
-    rows = [(code(term.name), term.unit, term.meaning) for term in posse.REWARD_TERMS]
-    return table(("term", "unit", "meaning"), rows)
+    """Return the terms of the reward with their weights by default."""
+    weights = dict(posse.Scenario(name="plain").reward_weights)
+    rows = [(code(term.name), term.unit, f"{weights.get(term.name, 0):g}", term.meaning) for term in posse.REWARD_TERMS]
+    return table(("term", "unit", "weight", "meaning"), rows)

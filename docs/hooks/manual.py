@@ -17,29 +17,47 @@ from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 
 import declared_tables
-import notebook_page
 import replays
 import standings
 from equations import typeset
 
+ROOT: Final = Path(__file__).parents[2]
+
+
+def bibtex() -> str:
+    """Return how to cite posse, as the README has it."""
+    return (ROOT / "README.md").read_text(encoding="utf-8").partition("## Cite\n")[2].strip()
+
+
+def contributing() -> str:
+    """Return CONTRIBUTING.md, whose links lead to pages here."""
+    return (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").replace("](docs/", "](")
+
+
 PARTS: Final[dict[str, Callable[..., str]]] = {
-    "scenarios": declared_tables.scenarios,
-    "settings": declared_tables.settings,
+    "scenario": replays.scenario,
     "all_settings": declared_tables.all_settings,
-    "observation_fields": declared_tables.observation_fields,
+    "observation": declared_tables.observation,
     "metrics": declared_tables.metrics,
     "training_defaults": declared_tables.training_defaults,
     "reward_terms": declared_tables.reward_terms,
     "replay": replays.replay,
-    "gallery": standings.gallery,
-    "scores": standings.scores,
     "leaderboard": standings.leaderboard,
     "results": standings.results,
     "training_seeds": standings.training_seeds,
     "algorithms": standings.algorithms,
+    "bibtex": bibtex,
+    "contributing": contributing,
+    "duel_script": standings.duel_script,
+    "duel_leagues": standings.duel_leagues,
     "peers": standings.peers,
-    "notebook": notebook_page.notebook,
 }
+_CODE: Final = re.compile(r"<code>([^<\n]+)</code>")
+_WORD: Final = re.compile(r"(?<!\S)\S{1,36}(?!\S)")
+"""What stays in one piece, if it is not wider than a phone."""
+_CELL: Final = re.compile(r"<td>(.*?)</td>", re.DOTALL)
+_LONG: Final = 24
+"""Letters from which a cell of a table keeps some width on a phone."""
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
 
 
@@ -50,8 +68,18 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Typeset the equations of a page."""
-    return typeset(html)
+    """Typeset the equations of a page, keep names in one piece, and mark long cells of tables."""
+    return typeset(_CELL.sub(_marked, _CODE.sub(_in_pieces, html)))
+
+
+def _in_pieces(found: re.Match[str]) -> str:
+    if len(found[1]) <= 36:
+        return f'<code class="name">{found[1]}</code>'
+    return "<code>" + _WORD.sub(r'<span class="name">\g<0></span>', found[1]) + "</code>"
+
+
+def _marked(found: re.Match[str]) -> str:
+    return f'<td class="long">{found[1]}</td>' if len(re.sub("<.*?>", "", found[1])) >= _LONG else found[0]
 
 
 def on_post_build(config: MkDocsConfig, **_: Any) -> None:

@@ -13,11 +13,12 @@ from mkdocs.exceptions import PluginError
 import posse
 import posse_baselines
 import posse_training
-from declared_tables import code
+from declared_tables import changed_settings, code
 from posse_training.replay import record, write_replay
 
 ROOT: Final = Path(__file__).parents[2]
 CACHE: Final = ROOT / "build" / "replays"
+PICTURES: Final = ROOT / "docs" / "media" / "scenarios"
 SEED: Final = 7
 
 
@@ -56,6 +57,17 @@ def replay(name: str) -> str:
     )
 
 
+def scenario(name: str) -> str:
+    """Return a scenario of the gallery: its picture, meaning, replay and settings."""
+    own = posse.get_scenario(name)
+    picture = PICTURES / f"{name}.png"
+    shown = f"![A team on {name}](media/scenarios/{name}.png){{ .scenario }}\n" if picture.is_file() else ""
+    played = next((key for key, each in REPLAYS.items() if each.scenario == name), None)
+    watch = f' <a href="site:media/replays/{played}.html">Replay</a>.' if played else ""
+    changed = changed_settings(name)
+    return f"{shown}{own.meaning} Version {own.version}.{watch}\n\n{changed or 'All settings have their defaults.'}\n"
+
+
 def write_replays(site: Path) -> None:
     """Write the pages into a manual that was built."""
     (site / "media" / "replays").mkdir(parents=True, exist_ok=True)
@@ -66,7 +78,8 @@ def write_replays(site: Path) -> None:
 def page(name: str) -> Path:
     """Return the file of a replay, played unless one of the same sources is there."""
     shown = REPLAYS[name]
-    path = CACHE / f"{name}-{_sources()}.html"
+    made_from = hashlib.sha256(f"{_sources()} {SEED} {shown}".encode()).hexdigest()[:12]
+    path = CACHE / f"{name}-{made_from}.html"
     if not path.is_file():
         CACHE.mkdir(parents=True, exist_ok=True)
         played = record(
@@ -78,11 +91,11 @@ def page(name: str) -> Path:
 
 @functools.cache
 def _sources() -> str:
-    """Return a digest of all files of the packages and of this one."""
+    """Return a digest of all files of the packages."""
     packages = [Path(str(package.__file__)).parent for package in (posse, posse_baselines, posse_training)]
     files = [path for root in packages for path in sorted(root.rglob("*")) if "__pycache__" not in path.parts]
     digest = hashlib.sha256()
-    for path in (Path(__file__), *files):
+    for path in files:
         if path.is_file():
             digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    return digest.hexdigest()

@@ -18,19 +18,9 @@ from posse_training.leaderboard import WORLDS, Standing, read_standings
 
 RESULTS: Final = Path(__file__).parents[2] / "benchmarks"
 STANDINGS: Final = RESULTS / "standings.csv"
+LEAGUES: Final = tuple(sorted((RESULTS / "league").glob("*.csv")))
+"""The matrix of a league of `duel` for each seed, as ``posse league`` writes it."""
 SCENARIOS: Final = tuple(n for n in posse.scenario_names() if not n.startswith("paper"))
-SUMMARY: Final = {
-    "constant": "a target that runs straight on",
-    "accelerating": "a target that weaves",
-    "smart": "an evader, slower and more agile than the trackers",
-    "search": "find the target first, with short sight",
-    "obstacles": "discs block paths and the view",
-    "radio": "messages are late and get lost",
-    "leader-loss": "the only one that sees the target breaks",
-    "field": "all of it at once, with noise",
-    "duel": "a target that may have learned to escape",
-    "robots": "TurtleBots: poses drift, commands act late",
-}
 
 
 @functools.cache
@@ -52,30 +42,6 @@ def of_scenario(scenario: str) -> list[Standing]:
     return [row for row in mine if row.reads_state] + ranked
 
 
-def gallery() -> str:
-    """Return a card for each scenario: picture, name, what it is about."""
-    cards = [
-        f'- <a href="site:scenarios/{name}/"><img src="site:media/scenarios/{name}.png" '
-        f'alt="A team on {name}" loading="lazy"></a>\n\n'
-        f'    <a href="site:scenarios/{name}/"><strong>{name}</strong></a>: {SUMMARY[name]}\n'
-        for name in SCENARIOS
-    ]
-    return '<div class="cards" markdown>\n\n' + "\n".join(cards) + "\n</div>\n"
-
-
-def scores(scenario: str) -> str:
-    """Return a table of who scores what on a scenario."""
-    mine = of_scenario(scenario)
-    if not mine:
-        return "No results of this version yet: `make results` makes them.\n"
-    best = max((row.safe_score for row in mine if row.reads_state), default=None)
-    rows = []
-    for row in mine:
-        of_planner = "" if best is None or row.reads_state else f"{row.safe_score / best:.2f}"
-        rows.append((_name(row), _score(row), of_planner, f"{row.contact_free:.1%}"))
-    return table(("team", "safe score [95 %]", "of the planner's", "contact-free"), rows)
-
-
 def leaderboard() -> str:
     """Return the leaderboard: a table for each scenario."""
     parts = []
@@ -87,7 +53,9 @@ def leaderboard() -> str:
             worlds = (f"{row.worlds:,}", row.seed, code(row.commit[:7]))
             rows.append((place, _name(row), _score(row), f"{row.contact_free:.1%}", *worlds))
         header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit")
-        parts.append(f"### {scenario}\n\n" + (table(header, rows) if rows else "No results yet.\n"))
+        best = next((f"{row[1]} {row[2]}" for row in rows if row[0] == 1), "No results yet")
+        summary = f"<summary markdown='span'>{best}</summary>"
+        parts.append(f"### {scenario}\n\n<details markdown>{summary}\n\n{table(header, rows)}\n</details>\n")
     return "\n".join(parts)
 
 
@@ -116,7 +84,7 @@ def training_seeds() -> str:
 
 def algorithms() -> str:
     """Return what algorithms reach from nothing: the mean of their training seeds, and their range."""
-    runs = _rows("algorithms.csv")
+    runs = _rows(RESULTS / "algorithms.csv")
     rows = []
     for scenario, name in sorted({(run["scenario"], run["algorithm"]) for run in runs}):
         mine = [run for run in runs if (run["scenario"], run["algorithm"]) == (scenario, name)]
@@ -130,21 +98,51 @@ def algorithms() -> str:
     return table(header, rows)
 
 
+def duel_script() -> str:
+    """Return what the tuned script scores in `duel` against scripted targets and those that read nothing."""
+    found = _league(LEAGUES[0])
+    names = [target for team, target in found if team == "ddcs-tuned" and not target.startswith("target-")]
+    rows = []
+    for name in names:
+        run = found["ddcs-tuned", name]
+        share = f"{1 - float(run['contact_free']):.1%}"
+        rows.append((code(name), f"{float(run['safe_score']):.3f}", f"{float(run['score']):.3f}", share))
+    return table(("target", "safe score", "score", "worlds with contact"), rows)
+
+
+def duel_leagues() -> str:
+    """Return what the script and the last team of each league score against its targets."""
+    rows = []
+    for path in LEAGUES:
+        found = {pair: float(run["safe_score"]) for pair, run in _league(path).items()}
+        for team in ("ddcs-tuned", "trackers-6"):
+            of = {target: score for (each, target), score in found.items() if each == team}
+            worst = min(of, key=lambda name: of[name])
+            shown = (f"{of[name]:.3f}" for name in ("smart", "target-1", "target-6"))
+            rows.append((path.stem, code(team), *shown, f"{of[worst]:.3f}, {code(worst)}"))
+    targets = (code(name) for name in ("smart", "target-1", "target-6"))
+    return table(("seed", "team", *targets, "lowest, and against whom"), rows)
+
+
+def _league(path: Path) -> dict[tuple[str, str], dict[str, str]]:
+    """Return the rows of a league's matrix by team and target."""
+    return {(run["team"], run["target"]): run for run in _rows(path)}
+
+
 def peers() -> str:
     """Return the throughput of simulators by number of worlds, million agent-steps/s."""
-    runs = _rows("peers.csv")
+    runs = _rows(RESULTS / "peers.csv")
     batches = sorted({int(run["worlds"]) for run in runs})
     found = {(run["simulator"], run["threads"], int(run["worlds"])): run for run in runs}
     rows = []
     for name, threads in dict.fromkeys((run["simulator"], run["threads"]) for run in runs):
         cells = [found.get((name, threads, batch)) for batch in batches]
         rows.append((name, threads, *("" if c is None else f"{float(c['agent_steps']) / 1e6:.3g}" for c in cells)))
-    made = f"{runs[0]['machine']}, commit {code(runs[0]['commit'])}.\n\n"
-    return made + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
+    return f"{runs[0]['machine']}.\n\n" + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
 
 
-def _rows(name: str) -> Sequence[dict[str, str]]:
-    with (RESULTS / name).open(newline="", encoding="utf-8") as file:
+def _rows(path: Path) -> Sequence[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -14,4 +14,5 @@ envs = gym.make_vec(
 )
 envs = RecordEpisodeStatistics(envs)
 observations, infos = envs.reset(seed=1)
-observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
+actions = envs.action_space.sample()
+observations, rewards, terminated, truncated, infos = envs.step(actions)

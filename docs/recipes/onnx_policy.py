@@ -1,4 +1,4 @@
-"""The learned target as ONNX does in an episode what the policy does."""
+"""The learned target as ONNX does what the policy does."""
 
 import numpy as np
 import onnxruntime
@@ -10,12 +10,15 @@ from posse_training.commands.export import export
 evader = load_target("evader").policy
 export(evader, "evader.onnx")
 network = onnxruntime.InferenceSession("evader.onnx")
-batch = posse.batch("duel", 1, split="test", team_policy=load("pursuit"))
-observations, memory, over = batch.reset(), evader.begin(batch.layout, 1), False
+team = load("pursuit")
+batch = posse.batch("duel", split="test", team_policy=team)
+observations, over = batch.reset(), False
+memory = evader.begin(batch.layout, 1)
 while not over:
-    (actions,) = network.run(["action"], {"observation": observations[0]})
+    seen = {"observation": observations[0]}
+    (actions,) = network.run(["action"], seen)
     wanted, memory = evader.act(observations, memory)
     np.testing.assert_allclose(actions, wanted[0], atol=1e-5)
-    observations, _, terminated, truncated, _ = batch.step(actions[None])
-    over = (terminated | truncated).any()
+    observations, _, ended, cut, _ = batch.step(actions[None])
+    over = (ended | cut).any()
 print("equal to 1e-5 in every step")

@@ -7,8 +7,11 @@ layout = ObservationLayout(get_scenario("constant"))
 
 
 def chase(observations):
-    views = layout.views(observations)  # turn towards the last fix of the target, at full speed
-    return np.stack([np.ones_like(views["speed"]), views["target_bearing"][..., 1]], axis=-1)
+    """Turn towards the last fix of the target, at full speed."""
+    views = layout.views(observations)
+    turn = views["target_bearing"][..., 1]  # the sine
+    return np.stack([np.ones_like(turn), turn], axis=-1)
 
 
-policy = from_function(chase)  # posse compare own_function:policy ddcs-tuned --scenario constant
+# posse compare own_function:policy pursuit --scenario constant
+policy = from_function(chase)

@@ -5,7 +5,9 @@ from posse_training import evaluate
 from posse_training.sb3 import from_sb3
 
 env = gym.make("posse:posse/Solo-v0", scenario="constant")
-model = PPO("MlpPolicy", env, n_steps=256, device="cpu").learn(512)  # some 10**6 to learn anything
+model = PPO("MlpPolicy", env, n_steps=256, device="cpu")
+model.learn(512)  # some 10**6 to learn anything
 model.save("solo.zip")
-results = evaluate(from_sb3(PPO.load("solo.zip")), "constant", episodes=20, num_trackers=1)
+policy = from_sb3(PPO.load("solo.zip"))
+results = evaluate(policy, "constant", episodes=20, num_trackers=1)
 print(results.estimate("score"))

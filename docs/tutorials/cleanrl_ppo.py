@@ -1,6 +1,6 @@
-"""PPO in one file, in the style of CleanRL, on torch and the PettingZoo environment alone.
+"""PPO in one file, in the style of CleanRL, on torch and PettingZoo.
 
-All trackers share one policy. Run it with: python docs/tutorials/cleanrl_ppo.py
+All trackers share one policy: python docs/tutorials/cleanrl_ppo.py
 """
 
 import argparse
@@ -17,9 +17,13 @@ import posse
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--scenario", default="constant")
-parser.add_argument("--steps", type=int, default=1_000_000, help="steps of a tracker")
+parser.add_argument(
+    "--steps", type=int, default=1_000_000, help="steps of a tracker"
+)
 parser.add_argument("--envs", type=int, default=8)
-parser.add_argument("--rollout", type=int, default=128, help="control steps between two updates")
+parser.add_argument(
+    "--rollout", type=int, default=128, help="steps between two updates"
+)
 parser.add_argument("--epochs", type=int, default=4)
 parser.add_argument("--minibatches", type=int, default=4)
 parser.add_argument("--learning-rate", type=float, default=3e-4)
@@ -27,15 +31,20 @@ parser.add_argument("--discount", type=float, default=0.98)
 parser.add_argument("--gae-lambda", type=float, default=0.95)
 parser.add_argument("--clip", type=float, default=0.2)
 parser.add_argument("--seed", type=int, default=1)
-parser.add_argument("--file", type=Path, default=Path("runs/tutorials/cleanrl_ppo.safetensors"))
+file = Path("runs/tutorials/cleanrl_ppo.safetensors")
+parser.add_argument("--file", type=Path, default=file)
 args = parser.parse_args()
 torch.manual_seed(args.seed)
 torch.set_num_threads(1)
 
-# --- the environments: each has N agents, so a rollout has envs x N columns -----------------------
-# A small reward for holding a slot and a larger one for approaching it keep returns near 1.
+# --- the environments, of N agents: a rollout has envs x N columns ----
+# A small reward for holding a slot and a larger one for approaching it
+# keep returns near 1.
 weights = {"slot": 0.1, "progress": 0.5, "contact": -0.2}
-envs = [posse.parallel_env(args.scenario, first_world=k, reward_weights=weights) for k in range(args.envs)]
+how = {"scenario": args.scenario, "reward_weights": weights}
+envs = [
+    posse.parallel_env(**how, first_world=k) for k in range(args.envs)
+]
 agents = envs[0].possible_agents
 inputs = envs[0].observation_space(agents[0]).shape[0]
 outputs = envs[0].action_space(agents[0]).shape[0]
@@ -44,23 +53,26 @@ columns = len(envs) * len(agents)
 
 def stacked(rows):
     """Rows of every agent of every environment, as one array."""
-    return torch.as_tensor(np.stack([row[a] for row in rows for a in agents]), dtype=torch.float32)
+    stacked = np.stack([row[a] for row in rows for a in agents])
+    return torch.as_tensor(stacked, dtype=torch.float32)
 
 
-# --- policy and value function --------------------------------------------------------------------
+# --- policy and value function ----
 def network(out, gain):
     last = nn.Linear(64, out)
     nn.init.orthogonal_(last.weight, gain)
     nn.init.zeros_(last.bias)
-    return nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), last)
+    first, second = nn.Linear(inputs, 64), nn.Linear(64, 64)
+    return nn.Sequential(first, nn.Tanh(), second, nn.Tanh(), last)
 
 
 class Agent(nn.Module):
     def __init__(self):
         super().__init__()
-        self.policy, self.critic = network(outputs, 0.01), network(1, 1.0)
+        self.policy = network(outputs, 0.01)
+        self.critic = network(1, 1.0)
         self.log_deviation = nn.Parameter(torch.full((outputs,), -0.5))
-        # Statistics of the observations are part of the agent and saved with it.
+        # Statistics of the observations are saved with the agent.
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("square", torch.ones(inputs))
         self.register_buffer("count", torch.tensor(1e-4))
@@ -76,20 +88,25 @@ class Agent(nn.Module):
         return ((x - self.mean) / deviation).clamp(-5, 5)
 
     def choose(self, x):
-        return Normal(self.policy(self.normal(x)), self.log_deviation.exp())
+        mean = self.policy(self.normal(x))
+        return Normal(mean, self.log_deviation.exp())
 
     def value(self, x):
         return self.critic(self.normal(x)).squeeze(-1)
 
 
 agent = Agent()
-optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+optimizer = torch.optim.Adam(
+    agent.parameters(), lr=args.learning_rate, eps=1e-5
+)
 
-# --- learning -------------------------------------------------------------------------------------
+# --- learning ----
 shape = (args.rollout, columns)
-seen, acted = torch.zeros((*shape, inputs)), torch.zeros((*shape, outputs))
-log_probabilities, rewards, values = torch.zeros(shape), torch.zeros(shape), torch.zeros(shape)
-nexts, ends = torch.zeros(shape), torch.zeros(shape)  # value of what follows; last of an episode
+seen = torch.zeros((*shape, inputs))
+acted = torch.zeros((*shape, outputs))
+log_probabilities, rewards, values = torch.zeros((3, *shape))
+# Value of what follows; last of an episode.
+nexts, ends = torch.zeros((2, *shape))
 observation = stacked([env.reset(seed=args.seed)[0] for env in envs])
 scores, done, started = [], 0, time.time()
 
@@ -101,12 +118,15 @@ while done < args.steps:
             values[t] = agent.value(observation)
         seen[t], acted[t] = observation, action
         log_probabilities[t] = choice.log_prob(action).sum(-1)
-        rows, bounded = [], action.clamp(-1, 1).numpy().reshape(len(envs), len(agents), outputs)
+        bounded = action.clamp(-1, 1).numpy()
+        bounded = bounded.reshape(len(envs), len(agents), outputs)
+        rows = []
         for k, env in enumerate(envs):
-            row, reward, terminated, truncated, infos = env.step(dict(zip(agents, bounded[k], strict=True)))
+            moves = dict(zip(agents, bounded[k], strict=True))
+            row, reward, terminated, truncated, infos = env.step(moves)
             mine = slice(k * len(agents), (k + 1) * len(agents))
             rewards[t, mine] = torch.tensor([reward[a] for a in agents])
-            # A truncated episode is bootstrapped from its last observation.
+            # A truncated episode is bootstrapped from its last row.
             with torch.no_grad():
                 alive = 1.0 - float(terminated[agents[0]])
                 nexts[t, mine] = alive * agent.value(stacked([row]))
@@ -123,32 +143,41 @@ while done < args.steps:
     advantages, advantage = torch.zeros(shape), torch.zeros(columns)
     for t in reversed(range(args.rollout)):
         error = rewards[t] + args.discount * nexts[t] - values[t]
-        advantage = error + args.discount * args.gae_lambda * (1 - ends[t]) * advantage
+        fade = args.discount * args.gae_lambda * (1 - ends[t])
+        advantage = error + fade * advantage
         advantages[t] = advantage
     returns = (advantages + values).flatten()
     flat_seen, flat_acted = seen.flatten(0, 1), acted.flatten(0, 1)
-    flat_log, flat_advantages = log_probabilities.flatten(), advantages.flatten()
+    flat_log = log_probabilities.flatten()
+    flat_advantages = advantages.flatten()
 
     for _ in range(args.epochs):
-        for rows in torch.randperm(len(returns)).chunk(args.minibatches):
+        order = torch.randperm(len(returns))
+        for rows in order.chunk(args.minibatches):
             choice = agent.choose(flat_seen[rows])
-            ratio = (choice.log_prob(flat_acted[rows]).sum(-1) - flat_log[rows]).exp()
+            log = choice.log_prob(flat_acted[rows]).sum(-1)
+            ratio = (log - flat_log[rows]).exp()
             weight = flat_advantages[rows]
             weight = (weight - weight.mean()) / (weight.std() + 1e-8)
             clipped = ratio.clamp(1 - args.clip, 1 + args.clip)
-            policy_loss = -torch.min(ratio * weight, clipped * weight).mean()
-            value_loss = (agent.value(flat_seen[rows]) - returns[rows]).square().mean()
+            least = torch.min(ratio * weight, clipped * weight)
+            policy_loss = -least.mean()
+            missed = agent.value(flat_seen[rows]) - returns[rows]
+            value_loss = missed.square().mean()
             optimizer.zero_grad()
             (policy_loss + 0.5 * value_loss).backward()
-            # Clipped separately, or large gradients of the critic would scale down the policy's.
-            nn.utils.clip_grad_norm_([*agent.policy.parameters(), agent.log_deviation], 0.5)
+            # Clipped separately, or large gradients of the critic would
+            # scale down the policy's.
+            own = [*agent.policy.parameters(), agent.log_deviation]
+            nn.utils.clip_grad_norm_(own, 0.5)
             nn.utils.clip_grad_norm_(agent.critic.parameters(), 0.5)
             optimizer.step()
-    agent.see(flat_seen)  # between rollouts, so that the policy is constant within one
+    agent.see(flat_seen)  # not within a rollout, of one policy
 
     recent = f"{np.mean(scores[-20:]):.3f}" if scores else "-"
     rate = done / (time.time() - started)
-    print(f"{done:>9,} steps  score {recent}  reward {rewards.mean():.4f}  {rate:,.0f} steps/s")
+    shown = f"score {recent}  reward {rewards.mean():.4f}"
+    print(f"{done:>9,} steps  {shown}  {rate:,.0f} steps/s")
 
 args.file.parent.mkdir(parents=True, exist_ok=True)
 save_file(agent.state_dict(), args.file)

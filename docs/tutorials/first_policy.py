@@ -14,7 +14,9 @@ from posse_training.train.train import train
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=8_000_000)
-parser.add_argument("--out", type=Path, default=Path("runs/tutorials/first"))
+parser.add_argument(
+    "--out", type=Path, default=Path("runs/tutorials/first")
+)
 parser.add_argument("--episodes", type=int, default=200)
 arguments = parser.parse_args()
 
@@ -28,11 +30,14 @@ settings = replace(
     evaluate_every=max(arguments.steps // 5, 1),
     tensorboard=False,
 )
-# The best policy on validation worlds, as one file; its card records how it was trained.
+# The best policy on validation worlds, as one file; its card records
+# how it was trained.
 file = train(settings)
 policy = load(file)
 
 # The test split: used neither for training nor for selection.
 for contender in (load("pursuit"), load("ddcs-distributed"), policy):
-    results = evaluate(contender, "smart", episodes=arguments.episodes, progress=False)
+    results = evaluate(
+        contender, "smart", episodes=arguments.episodes, progress=False
+    )
     print(f"{contender.name:20s} {results.estimate('score')}")

@@ -1,6 +1,7 @@
 """Every command of the README and the manual's pages runs, read from the pages themselves.
 
-A page is followed from top to bottom in an empty folder, its Python and its shell, with the smallest budgets.
+A page is followed from top to bottom in an empty folder, its Python and its shell, with the smallest budgets; commands
+on Ray only where it is installed, since ``tests/training/cluster`` has them.
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib.util
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -62,13 +62,10 @@ FOLLOWED = [page for page in sorted(PAGES) if any("--8<--" not in text for _, _,
 @pytest.mark.long
 @pytest.mark.parametrize("page", FOLLOWED)
 def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
-    script, python = script_of(page, NOT_RUN, SHORTER, GIVEN), Path(sys.executable)
-    if re.search("--ray|ray=", script) and importlib.util.find_spec("ray") is None:
-        python = ROOT / ".venv-recipes" / "bin" / "python"
-        if not python.exists():
-            pytest.skip("needs Ray: make recipes")
+    no_ray = importlib.util.find_spec("ray") is None
+    script = script_of(page, [*NOT_RUN, *["--ray"] * no_ray], SHORTER, GIVEN)
     (tmp_path / "page.py").write_text(script, encoding="utf-8")
-    printed("page.py", program=python, cwd=tmp_path, seconds=900, SDL_VIDEODRIVER="dummy", BROWSER="true")
+    printed("page.py", cwd=tmp_path, seconds=900, SDL_VIDEODRIVER="dummy", BROWSER="true")
 
 
 @pytest.mark.parametrize("part", NOT_RUN)

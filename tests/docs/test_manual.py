@@ -15,10 +15,12 @@ from pathlib import Path
 
 import pytest
 from tests.support.html import Tags
+from tests.support.pages import FENCE, PAGES, ROOT
 
 import posse
 
-ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+COLUMNS = 72
 MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay", "posse_training.leaderboard")
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 
@@ -58,20 +60,32 @@ def pages(site: Path) -> list[Path]:
     return found
 
 
+def test_it_is_short() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in (*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md")]
+    assert len(texts) <= 25
+    assert sum(len(re.findall(r"\S*\w\S*", text)) for text in texts) <= 15_000
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_its_code_has_72_columns(page: str) -> None:
+    listed = [ROOT / name for name in re.findall(r'--8<-- "(.+\.py)"', PAGES[page])]
+    texts = [text for _, _, text in FENCE.findall(PAGES[page])] + [path.read_text(encoding="utf-8") for path in listed]
+    assert [line for text in texts for line in text.splitlines() if len(line) > COLUMNS] == []
+
+
 def test_it_is_built_without_a_warning(site: Path) -> None:
     assert (site / "index.html").is_file()
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_every_public_name_is_in_the_reference(site: Path, module: str) -> None:
-    package = module.partition(".")[0]
-    page = (site / "reference" / package / "index.html").read_text(encoding="utf-8")
+    text = "".join(page.read_text(encoding="utf-8") for page in (site / "reference").rglob("*.html"))
     names = importlib.import_module(module).__all__
-    assert [name for name in names if f'id="{module}.{name}"' not in page] == []
+    assert [name for name in names if f'id="{module}.{name}"' not in text] == []
 
 
 def test_every_setting_is_in_the_table(site: Path) -> None:
-    page = (site / "settings" / "index.html").read_text(encoding="utf-8")
+    page = (site / "scenarios" / "index.html").read_text(encoding="utf-8")
     rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in re.findall(r"(?s)<tr>.*?</tr>", page)]
     plain = [[html.unescape(re.sub("<.*?>", "", cell)) for cell in row] for row in rows]
     shown = {row[0]: row for row in reversed(plain) if row}  # of a name, the first

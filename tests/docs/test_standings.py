@@ -12,6 +12,7 @@ from types import ModuleType
 
 import pytest
 
+import posse
 from posse_training.leaderboard import Standing, standings_text
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -68,13 +69,18 @@ def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(
     path = tmp_path / "standings.csv"
     hostile = "![p](https://x.invalid/p){: onerror=alert(1) }"
     path.write_text(path.read_text(encoding="utf-8").replace("LABEL", hostile), encoding="utf-8")
-    for made in (hooks[0].leaderboard, hooks[0].results, lambda: hooks[0].scores("smart")):
+    for made in (hooks[0].leaderboard, hooks[0].results):
         with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be at most 100 letters"):
             made()
 
 
-def test_at_most_eight_replays_each_shown_on_a_page(hooks: tuple[ModuleType, ModuleType]) -> None:
-    replays = hooks[1].REPLAYS
-    text = "\n".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
+def test_at_most_eight_replays_each_in_the_gallery(hooks: tuple[ModuleType, ModuleType]) -> None:
+    replays, text = hooks[1].REPLAYS, (DOCS / "scenarios.md").read_text(encoding="utf-8")
     assert len(replays) <= 8
-    assert set(re.findall(r"\{\{ replay (\S+) \}\}", text)) == set(replays)
+    made = "".join(hooks[1].scenario(name) for name in re.findall(r"\{\{ scenario (\S+) \}\}", text))
+    assert set(re.findall(r"media/replays/(\S+)\.html", made)) == set(replays)
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_each_scenario_is_in_the_gallery(name: str) -> None:
+    assert re.search(rf"^### .*\b{name}\b", (DOCS / "scenarios.md").read_text(encoding="utf-8"), re.MULTILINE)

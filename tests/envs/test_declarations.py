@@ -161,7 +161,7 @@ print(posse.kernel_source(
 
 
 def test_the_generated_source_can_be_read(tmp_path: Path) -> None:
-    modules = {**examples("extend.md"), **examples("extend_targets.md")}
+    modules = examples("extend.md")
     done = run(tmp_path, SOURCE, **modules)
     assert done.returncode == 0, done.stderr
     for line in (

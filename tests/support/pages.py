@@ -16,7 +16,7 @@ PAGES = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path 
 PAGES |= {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "CONTRIBUTING.md")}
 PROGRAMS = ("posse", "make", "python", "pip", "ray")
 SHIPPED = ROOT / "baselines/posse_baselines/shipped"
-_FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(r"`((?:posse|make|python) [^`]+)`")
 # Closes every window after half a second, as a reader would some time.
 _POSSE = """
@@ -35,13 +35,14 @@ sys.exit(main(sys.argv[1:]))
 
 def shell_lines(text: str) -> list[str]:
     """Return the commands of a block, or none if it is no shell's."""
+    text = text.replace("\\\n", " ")
     lines = [line.removeprefix("$ ").partition("  #")[0].strip() for line in text.splitlines() if line.strip()]
     return lines if lines and all(line.startswith(PROGRAMS) for line in lines) else []
 
 
 def blocks(page: str) -> Iterator[tuple[str, str | None, str]]:
     """Yield the blocks of a page: "python" or "shell", the title, and the text or one command."""
-    for _, info, body in _FENCE.findall(PAGES[page]):
+    for _, info, body in FENCE.findall(PAGES[page]):
         text, title = textwrap.dedent(body), re.search(r'title="(.+?)"', info)
         if "python" in info:
             yield "python", title and title[1], text
@@ -52,7 +53,7 @@ def blocks(page: str) -> Iterator[tuple[str, str | None, str]]:
 
 def named(page: str) -> set[str]:
     """Return every command that a page names, in its blocks or its sentences."""
-    inline = {" ".join(command.split()) for command in _INLINE.findall(_FENCE.sub("", PAGES[page]))}
+    inline = {" ".join(command.split()) for command in _INLINE.findall(FENCE.sub("", PAGES[page]))}
     return inline | {text for kind, _, text in blocks(page) if kind == "shell"}
 
 

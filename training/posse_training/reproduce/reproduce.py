@@ -1,6 +1,6 @@
 """``posse reproduce``: section 4 of the paper, its figures 7 to 10, and results that it announces.
 
-The paper does not state scale, gains and starts; docs/reproduction.md lists those chosen here.
+The paper does not state scale, gains and starts; docs/paper.md lists those chosen here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Draws the picture of docs/watch.md: the window of ``posse watch``.
+"""Draws the picture of docs/comparison.md: the window of ``posse watch``.
 
-python docs/watch_pictures.py
+python docs/drawing/watch.py
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from posse.rendering.renderer import Renderer
 from posse_baselines import load
 from posse_training.film import Team
 
-OUT = Path(__file__).parent / "media" / "watch.png"
+OUT = Path(__file__).parents[1] / "media" / "watch.png"
 SECONDS = 18.0
 
 
