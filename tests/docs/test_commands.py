@@ -23,7 +23,6 @@ NOT_RUN = {
     "ray stop": "it stops every cluster of this machine",
     "10.0.0.1": "the address of another machine",
     "...": "what the dots stand for is elsewhere on the page",
-    "scripts/ship.py": "it writes to the package: tests/training/test_ship.py",
     "posse export": "onnx is in the recipes' environment: tests/training/test_export.py",
     "class Tracker(Node)": "a listing for ROS 2, which is no Python package",
 }
