@@ -12,8 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = dict.fromkeys(
-    ("benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_both"),
-    "recipes",
+    ("benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_both"), "recipes"
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
 LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
