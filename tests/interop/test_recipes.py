@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -18,13 +19,13 @@ OWN_ENVIRONMENT = dict.fromkeys(
 LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
 """Recipes that train, which takes long."""
 LONGEST = 24
-LONGER = {"robotarium": 60}
+LONGER = {"robotarium": 70}
 
 
-def run(name: str, folder: Path, python: Path | str = sys.executable) -> str:
+def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
     paths = [str(RECIPES), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
     done = subprocess.run(
-        [str(python), "-W", "ignore", str(RECIPES / f"{name}.py")],
+        [str(python), "-W", "ignore", str(RECIPES / f"{name}.py"), *arguments],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -60,6 +61,18 @@ def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
     if not python.exists():
         pytest.skip(f"needs .venv-{folder}: make recipes")
     run(name, tmp_path, python)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed"])
+def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> None:
+    python = ROOT / ".venv-recipes" / "bin" / "python"
+    if not python.exists():
+        pytest.skip("needs .venv-recipes: make recipes")
+    lines = run("robotarium", tmp_path, python, [team, "0.5", "3"]).splitlines()
+    settled, clean = (int(part.split()[0]) for part in lines[-1].split(", "))
+    assert settled >= 19
+    assert clean == 20
 
 
 @pytest.mark.parametrize("name", names())

@@ -210,7 +210,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
     speed, rate = 0.0, 0.0
     if age <= patience(team, me):
         speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
-        theta = wrap(theta + rate * age)
+        theta = wrap(theta + rate * (age + me.lead))
     frame = theta
     if team.settings.follower_frame == BY_SLOT_FRAME:
         frame, rate = angle_of(me.frame), float(me.psi_rate)

@@ -164,10 +164,9 @@ class Settings:
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
     """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
 
-    look_ahead: float = tuned(1.0, "", 0.0, 1.0)
+    foresight: float = tuned(1.0, "", 0.0, 1.0)
     """Where robots obey late: share of ``actuator_lag`` that commands make up for, up to the limits. With more than 0,
-    a team guided by ``"slot"`` also decides for the pose at which its command is executed (``command_delay``, at most
-    10 steps). 0: neither."""
+    the team also decides for the pose at which its command is executed, up to 10 steps of ``command_delay`` ahead."""
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
