@@ -1,6 +1,7 @@
 """Robots of the Robotarium's simulator form up on a sixth, 20 times.
 
-python robotarium.py [policy]
+python robotarium.py [policy [lag delay]]: the lag of the wheels in s,
+the delay of the commands in steps of 0.1 s
 """
 
 import sys
@@ -13,6 +14,12 @@ import posse
 from posse_baselines import deploy, load
 
 policy = load(sys.argv[1] if len(sys.argv) > 1 else "pngl-l-phi")
+late = len(sys.argv) > 2
+lag, delay = (
+    (float(sys.argv[2]), int(sys.argv[3])) if late else (0.0, 0)
+)
+# The share of a wanted change that a step of the simulator brings.
+follows = 1 - np.exp(-0.033 / lag) if lag else 1.0
 scale, n = 0.15 / 0.055, 5  # radius of a scenario's robot, of these, m
 scenario = posse.get_scenario(
     "constant",
@@ -25,6 +32,8 @@ scenario = posse.get_scenario(
     formation_spacing=0.8,
     tolerance=0.14,
     message_size=policy.message_size,
+    actuator_lag=lag,
+    command_delay=delay,
 )
 settled = clean = 0
 for seed in range(20):
@@ -34,11 +43,13 @@ for seed in range(20):
     arena = Robotarium(n + 1, False, False, start)
     robots = [posse.Robot(scenario, i, scale=scale) for i in range(n)]
     team = [deploy(policy, robot) for robot in robots]
-    moving, said, errors = np.zeros((2, n + 1)), [()] * n, []
+    said, errors, moving = [()] * n, [], np.zeros((2, n + 1))
+    moving[:, n] = 0.04, 0.0  # the target
+    waiting = [moving.copy() for _ in range(delay + 1)]
     for step in range(1200):
         poses = arena.get_poses().copy()
         if step % 3 == 0:  # a control step is three of the simulator's
-            moving[:, n] = 0.04, 0.0
+            commands = moving.copy()
             fix = posse.TargetFix(*poses[:, n])
             own = [(*poses[:, i], *moving[:, i]) for i in range(n)]
             heard = [posse.Heard(i, *own[i], said[i]) for i in range(n)]
@@ -46,7 +57,9 @@ for seed in range(20):
                 mates = heard[:i] + heard[i + 1 :]
                 pose, speeds = own[i][:3], own[i][3:]
                 command = robot.step(pose, *speeds, fix, None, mates)
-                moving[:, i], said[i] = command[:2], command.message
+                commands[:, i], said[i] = command[:2], command.message
+            waiting = [*waiting[1:], commands]
+        moving += follows * (waiting[0] - moving)
         arena.set_velocities(range(n + 1), moving.copy())
         arena.step()
         c, s = np.cos(poses[2, n]), np.sin(poses[2, n])

@@ -20,7 +20,7 @@ LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", 
 LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
 LONGEST = 15
-LONGER = {"onnx_policy": 20, "robotarium": 50}
+LONGER = {"onnx_policy": 20, "robotarium": 70}
 
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
@@ -53,6 +53,18 @@ def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
     if not python.exists():
         pytest.skip(f"needs .venv-{folder}: make recipes")
     run(name, tmp_path, python)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed"])
+def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> None:
+    python = ROOT / ".venv-recipes" / "bin" / "python"
+    if not python.exists():
+        pytest.skip("needs .venv-recipes: make recipes")
+    lines = run("robotarium", tmp_path, python, [team, "0.5", "3"]).splitlines()
+    settled, clean = (int(part.split()[0]) for part in lines[-1].split(", "))
+    assert settled >= 19
+    assert clean == 20
 
 
 @pytest.mark.parametrize("name", names())
