@@ -120,7 +120,7 @@ def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, made: Gener
     """Move all robots of world e by a control step, and store the messages."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, worlds.obstacle[e], actions, worlds.command[e], made.set_goal, scratch)
+    motion(c, worlds, e, actions, made.set_goal, scratch)
     w.step += 1
     if c.drifts != 0:
         drift(c, w, worlds.odometry[e])
