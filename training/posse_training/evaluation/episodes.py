@@ -49,9 +49,9 @@ def play_shard(
     seed: int,
     split: str,
     shard: range,
+    num_threads: int | None = None,
     *,
-    num_threads: int | None,
-    advance: Callable[[int], object],
+    advance: Callable[[int], object] = lambda steps: None,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
     played = []
