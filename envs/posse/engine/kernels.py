@@ -162,7 +162,7 @@ def advance_worlds(
             order = START
         if order == STEP:
             apply_faults(c, w, trackers)
-            motion(c, w, trackers, obstacles, actions[e], worlds.command[e], made.set_goal, scratch)
+            motion(c, worlds, e, actions[e], made.set_goal, scratch)
             w.step += 1
             if c.drifts != 0:
                 drift(c, w, worlds.odometry[e])

@@ -15,7 +15,6 @@ from posse.numeric import (
     ONE,
     WIDTH,
     ZERO,
-    FloatArray,
     Lanes,
     Record,
     Records,
@@ -69,15 +68,15 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 @compiled
 def free_of_robots(
-    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, xs: FloatArray, ys: FloatArray, count: int
+    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, s: Record, count: int
 ) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 
-    The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
+    The positions of ``count`` robots are in ``s.near_x`` and ``s.near_y``; the robot itself may be among them.
     """
     reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
     for k in range(0, WIDTH * blocks(count), WIDTH):
-        share = min(share, least(free_share(x, y, dx, dy, load(xs, k), load(ys, k), reach)))
+        share = min(share, least(free_share(x, y, dx, dy, load(s.near_x, k), load(s.near_y, k), reach)))
     return np.float32(share)
 
 

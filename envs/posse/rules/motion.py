@@ -33,7 +33,7 @@ from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import FAR, blocks, columns, nonnegative, store_rows
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.randomness import DRIFT, normal_pair
-from posse.rules.state import NEVER, POSE, Pose
+from posse.rules.state import NEVER, POSE, Pose, WorldArrays
 from posse.rules.targets.steering import target_turn_rate
 
 
@@ -48,9 +48,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_step
     )
     x, y = robot.x, robot.y
-    share = lesser(
-        free_of_robots(c, x, y, dx, dy, s.near_x, s.near_y, count), free_of_surroundings(c, obstacles, x, y, dx, dy)
-    )
+    share = lesser(free_of_robots(c, x, y, dx, dy, s, count), free_of_surroundings(c, obstacles, x, y, dx, dy))
     if share < ONE:
         dx, dy = dx * share, dy * share
         robot.speed = ZERO
@@ -157,23 +155,15 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
 
 
 @compiled
-def motion(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    actions: FloatArray,
-    command: FloatArray,
-    set_goal: Any,
-    s: Record,
-) -> None:
-    """Move the robots by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
+def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal: Any, s: Record) -> None:
+    """Move the robots of world e by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
 
-    Actions of trackers wait in ``command`` for the delay.
+    Actions of trackers wait in ``worlds.command`` for the delay.
 
     A robot with nothing near moves on one arc, or with limited acceleration on one per physics
     step; a robot with something near moves in swept physics steps.
     """
+    w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
     if c.target_agent != 0:
         action = actions[c.num_trackers]
         share, least = HALF * (action[0] + ONE), c.target_least_speed
@@ -190,7 +180,7 @@ def motion(
             dx, dy, w.heading_cos, w.heading_sin = arc(w.heading_cos, w.heading_sin, w.speed, w.turn_rate, time)
             w.x += dx
             w.y += dy
-    take_commands(c, w, actions, command, s)
+    take_commands(c, w, actions, worlds.command[e], s)
     if move_freely(c, trackers, parts, time, s) or w.near != 0:
         move_in_parts(c, w, trackers, obstacles, s)
     w.frame_cos, w.frame_sin = follow_heading(

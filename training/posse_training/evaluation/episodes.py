@@ -54,7 +54,7 @@ def play_shard(
     split: str,
     shard: range,
     *,
-    num_threads: int | None,
+    num_threads: int | None = None,
     advance: Callable[[int], object] = no_report,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
