@@ -105,7 +105,7 @@ def test_many_agents(check: Callable[[Settings], None], variant: str) -> None:
     check(VARIANTS[variant])
 
 
-@pytest.mark.parametrize("variant", [name for name in VARIANTS if "target" not in VARIANTS[name]])
+@pytest.mark.parametrize("variant", [name for name in VARIANTS if "target_motion" not in VARIANTS[name]])
 @pytest.mark.parametrize("name", ["Team", "Solo", "Tracker"])
 def test_one_agent(name: str, variant: str) -> None:
     settings = {**VARIANTS[variant], "horizon": 8}

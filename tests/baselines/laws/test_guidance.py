@@ -199,6 +199,7 @@ OFFSET = 0.15
 def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
     l_now: float, phi: float, gamma: float, l_d: float, phi_d: float, leader_speed: float, leader_omega: float
 ) -> None:
+    assume(abs(short_way(phi_d - phi)) < math.pi - 1e-6)  # at half a turn either way is right
     demand = formation.l_phi_demand(Polar(l_now, phi), Polar(l_d, phi_d), leader_speed, leader_omega, 2.0, 1.5)
     point = formation.point_velocity(Demand(l_now, demand, gamma))  # in the follower's own axes
     along = point * cmath.exp(-1j * gamma)  # along l, and across it

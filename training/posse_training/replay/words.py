@@ -64,7 +64,7 @@ def _losses(player: Player) -> tuple[dict[str, float], dict[str, int]]:
 def _reason(first: Player, second: Player) -> str:
     """Return where the second team fell behind the first, one cause or two; empty if nowhere in particular."""
     (kept, _), (lost, times) = _losses(first), _losses(second)
-    behind = {cause: lost.get(cause, 0.0) - kept.get(cause, 0.0) for cause in {*lost, *kept}}
+    behind = {cause: lost.get(cause, 0.0) - kept.get(cause, 0.0) for cause in dict.fromkeys((*lost, *kept))}
     total, greatest = sum(behind.values()), sorted(behind, key=lambda cause: -behind[cause])
     for causes in (greatest[:1], greatest[:2]):
         share = sum(behind[cause] for cause in causes) / max(total, 1e-9)
