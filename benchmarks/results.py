@@ -21,6 +21,7 @@ SCENARIOS: Final = tuple(name for name in posse.scenario_names() if not name.sta
 ONLY: Final = {
     "ddcs-centralized-no-exchange": ("leader-loss",),
     "ddcs-no-radio": ("search", "radio", "field"),
+    "belief-planner": (),  # seconds a world: posse compare belief-planner ddcs-tuned
     "idle": (),
     "random": (),
 }
@@ -40,7 +41,7 @@ class Settings:
 
 def plays(name: str, scenario: str) -> bool:
     """Return whether a policy has a row on a scenario: learned ones on their own, a generalist on all."""
-    own = name.removeprefix("learned-")
+    own = name.removeprefix("learned-").removeprefix("corrected-")
     return scenario in ONLY.get(name, SCENARIOS) and (own == name or own in (scenario, "generalist"))
 
 

@@ -98,7 +98,7 @@ def ship(settings: Settings) -> Path:
 
 def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:
     if not settings.name.startswith(LEARNED):
-        raise SettingsError(f"name={settings.name!r} must begin with {LEARNED!r}")
+        raise SettingsError(f"name={settings.name!r} must begin with {' or '.join(LEARNED)}")
     _check_one_training(settings.runs, trained)
     plays = []
     for policy in policies:

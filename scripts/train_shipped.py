@@ -25,9 +25,11 @@ ALGORITHMS: Final = {
     "field": "mappo",
     "search": "mappo",
 }
-"""Scenarios with a learned team of their own, ``learned-SCENARIO``, and how it is trained."""
+"""Scenarios with a correction of their own, ``corrected-SCENARIO``, and how it is trained."""
+FROM_NOTHING: Final = ("smart", "radio")
+"""Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SEEDS: Final = {"smart": 5, "field": 5}
-"""Number of training seeds, 3 for the other scenarios."""
+"""Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,11 @@ class Settings:
     """Command-line arguments."""
 
     seed: tuple[int, ...] = ()
-    """Training seeds; default: 1 to 3, for smart and field 1 to 5."""
+    """Training seeds; default: 1 to 3, of the corrections for smart and field 1 to 5."""
     scenario: tuple[str, ...] = tuple(ALGORITHMS)
     """Scenarios to train on."""
     out: Path = Path("runs/shipped")
-    """Folder of the run folders SCENARIO-SEED."""
+    """Folder of the run folders corrected-SCENARIO-SEED and learned-SCENARIO-SEED."""
 
 
 def all_runs(settings: Settings) -> list[TrainSettings]:
@@ -48,16 +50,16 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
         if name not in ALGORITHMS:
             known = ", ".join(ALGORITHMS)
             raise SettingsError(f"scenario={name!r:.80} has no learned team of its own; those that have: {known}")
-    return [
-        replace(
-            default_settings(name, ALGORITHMS[name], preset="residual"),
-            seed=seed,
-            folder=settings.out / f"{name}-{seed}",
-        )
-        for seed in settings.seed or range(1, 1 + max(SEEDS.values()))
-        for name in settings.scenario
-        if settings.seed or seed <= SEEDS.get(name, 3)
-    ]
+    runs = []
+    for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
+        for name in settings.scenario:
+            if settings.seed or seed <= SEEDS.get(name, 3):
+                corrects = default_settings(name, ALGORITHMS[name], preset="residual")
+                runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
+            if name in FROM_NOTHING and (settings.seed or seed <= 3):
+                learns = default_settings(name)
+                runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
+    return runs
 
 
 if __name__ == "__main__":

@@ -26,8 +26,8 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
 SHIPPED_TARGETS: Final = SHIPPED / "targets"
 """The folder of the learned targets that come with the package."""
-LEARNED: Final = "learned-"
-"""Prefix of the names of learned policies."""
+LEARNED: Final = ("learned-", "corrected-")
+"""Prefixes of the names of learned policies: networks that act, and networks that correct a script."""
 AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
 Worlds = TypeVar("Worlds", bound=Scenario | Family)
@@ -69,7 +69,7 @@ def policy_names() -> tuple[str, ...]:
 
 def shipped() -> dict[str, Path]:
     """Return the files of the learned policies that come with the package, by name."""
-    return {path.stem: path for path in sorted(SHIPPED.glob(f"{LEARNED}*.safetensors"))}
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.safetensors"))}
 
 
 def target_names() -> tuple[str, ...]:

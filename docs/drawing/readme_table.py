@@ -12,6 +12,8 @@ from typing import Final
 sys.path.insert(0, str(Path(__file__).parents[1] / "hooks"))
 
 import standings
+from posse_baselines.learned import LearnedPolicy
+from posse_baselines.registry import shipped
 from posse_training.leaderboard import Standing
 
 README: Final = Path(__file__).parents[2] / "README.md"
@@ -21,20 +23,20 @@ BASELINE: Final = "pngl-l-phi"
 
 
 def table() -> str:
-    """Return the table: baseline, best scripted and best learned team, and the planner."""
+    """Return the table: baseline, the best team of each kind, and the planner."""
     lines = [
-        f"| scenario | baseline, `{BASELINE}` | best scripted team | best learned team | planner |",
-        "|---|---|---|---|---|",
+        f"| scenario | baseline, `{BASELINE}` | best script | learned from nothing | learned correction | planner |",
+        "|---|---|---|---|---|---|",
     ]
+    corrects = {name: LearnedPolicy.from_file(path).adviser is not None for name, path in shipped().items()}
     for scenario in standings.SCENARIOS:
         found = {r.policy: r for r in standings.of_scenario(scenario)}  # the best first
         if not found:
             continue
         teams = {name: r for name, r in found.items() if not r.reads_state}
-        learned = [name for name in teams if name.startswith("learned-")]
-        scripted = [name for name in teams if not name.startswith("learned-")]
+        kinds = ([name for name in teams if corrects.get(name) is kind] for kind in (None, False, True))
         cells = [_cell(found, BASELINE, named=False)]
-        cells += [_cell(found, next(iter(names), ""), named=True) for names in (scripted, learned)]
+        cells += [_cell(found, next(iter(names), ""), named=True) for names in kinds]
         cells += [_cell(found, "planner", named=False)]
         lines.append(f"| `{scenario}` | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

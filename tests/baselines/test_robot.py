@@ -48,8 +48,8 @@ def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
     [
         ("smart", "pngl-l-phi", False),  # it always sees the target, and estimates ψ itself
         ("radio", "ddcs-tuned", True),
-        ("field", "learned-field", True),
-        ("search", "learned-search", True),
+        ("field", "corrected-field", True),
+        ("search", "corrected-search", True),
     ],
 )
 def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, frame: bool) -> None:

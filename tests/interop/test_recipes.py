@@ -19,8 +19,8 @@ OWN_ENVIRONMENT = dict.fromkeys(
 LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", "torchrl_batch", "torchrl_gym"}
 LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
-LONGEST = 15
-LONGER = {"onnx_policy": 20, "robotarium": 70}
+LONGEST = 24
+LONGER = {"robotarium": 70}
 
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:

@@ -53,11 +53,14 @@ def policies(arguments: Sequence[str]) -> None:
     """List the policies, each with a sentence."""
     which = tyro.cli(_Policies, prog="posse policies", args=arguments)
     from posse_baselines.policies.scripted import ABLATIONS, MEANINGS
-    from posse_baselines.registry import LEARNED, shipped
+    from posse_baselines.registry import shipped
 
     rows = [(name, text) for name, text in MEANINGS.items() if which.all or name not in ABLATIONS]
-    rows += [(name, f"learned on {name.removeprefix(LEARNED)}") for name in shipped()]
-    rows = [(name, text.replace("learned on generalist", "learned on eight scenarios at once")) for name, text in rows]
+    for name in shipped():
+        kind, _, scenario = name.partition("-")
+        where = "eight scenarios at once" if scenario == "generalist" else scenario
+        learned = "a correction of ddcs-tuned, learned" if kind == "corrected" else "learned"
+        rows.append((name, f"{learned} on {where}"))
     _show(("policy", "what it does"), rows)
     if not which.all:
         print("\nposse policies --all lists ablations, too")
