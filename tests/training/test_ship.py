@@ -72,7 +72,7 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
         return str(caught.value)
 
     assert "must have different training seeds" in refused(runs[0], runs[0])
-    assert "must begin with 'learned-'" in refused(*runs, name="smart")
+    assert "must begin with learned- or corrected-" in refused(*runs, name="smart")
     assert "no run folders given" in refused()
     assert "is not a run folder" in refused(tmp_path)
     other = tmp_path / "other"
