@@ -223,7 +223,7 @@ def shares(
     if num_worlds < len(drawn):
         fail("num_worlds", num_worlds, f"it must be at least {len(drawn)}, one for each scenario")
     ends = [num_worlds * k // len(drawn) for k in range(len(drawn) + 1)]
-    return [(one, range(first, end)) for one, first, end in zip(drawn, ends[:-1], ends[1:], strict=True)]
+    return [(one, range(first, end)) for one, (first, end) in zip(drawn, itertools.pairwise(ends), strict=True)]
 
 
 def blocks(given: Scenario | Family, worlds: range, seed: int, split: str) -> Iterator[tuple[Scenario, range]]:
