@@ -109,8 +109,8 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
     from posse_training.tune import TuneSettings, tune
 
     small: dict[str, Any] = {
-        "num_worlds": 4,
-        "family_scenarios": 3,
+        "num_worlds": 36,
+        "family_scenarios": 36,
         "rollout": 8,
         "minibatch": 32,
         "evaluate_worlds": 4,

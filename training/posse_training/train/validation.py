@@ -28,7 +28,8 @@ def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> 
     Without them the first updates learn from inputs of very different sizes, and the run lags behind for millions of
     steps.
     """
-    warm = make_env(replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings)))))
+    few = max(_WARM_WORLDS, len(pairings(settings)))
+    warm = make_env(replace(settings, num_worlds=few if few >= len(settings.scenarios) else settings.num_worlds))
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
     reach = 1.0 if settings.advise is None else _WARM_REACH
