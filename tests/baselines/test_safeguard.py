@@ -65,6 +65,23 @@ def test_it_keeps_robots_apart_that_want_the_same_place() -> None:
     assert way > 0.2 * far
 
 
+def test_it_foresees_commands_that_act_late() -> None:
+    """Robots that want to go one way settle on it without swinging about it, though commands lag and wait."""
+    batch = posse.batch(
+        "constant", 8, actuator_lag=0.3, command_delay=3, start_distance=(3.0, 5.0), autoreset="disabled"
+    )
+    observations, guard = batch.reset(seed=2), Guard(batch.layout, 8)
+    errors = []
+    for _ in range(60):
+        views = batch.layout.views(observations)
+        c, s = views["heading"][..., 0], views["heading"][..., 1]
+        guard.follow(observations)
+        observations, *_ = batch.step(guard.actions(0.5 * np.stack([c, -s], axis=-1)))  # along the common x axis
+        errors.append(np.abs(np.arctan2(s, c)))
+    assert np.median(errors[0]) > 0.5
+    assert np.quantile(errors[40:], 0.9) < 0.05
+
+
 def test_environments_do_as_the_batch_does() -> None:
     """PettingZoo, Gymnasium and the layer itself make the same motions of the same velocities."""
     batch = posse.batch("smart", 1, seed=5, message_size=1, autoreset="disabled")

@@ -102,13 +102,17 @@ def carry_out(
 
 @compiled
 def guard(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray) -> None:
-    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten."""
+    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten.
+
+    It is relative to the observed heading, and carried out from the pose at which the command is executed.
+    """
     monitor(team, me, mates, row)
     wanted = complex(float(action[0]), float(action[1]))
     wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
+    foresee(team, me)
     discs = work.discs[: surround(team, me, mates, row, work.discs)]
     velocity, _ = safe_velocity(me, discs, wanted, work.plays)
-    speed, omega = regulate(me, velocity, 0.0)
+    speed, omega = make_up(team, me, *regulate(me, velocity, 0.0))
     write_motion(action, speed, omega, me.max_speed, me.max_omega)
     me.step += 1
 
