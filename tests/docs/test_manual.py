@@ -61,8 +61,9 @@ def pages(site: Path) -> list[Path]:
 
 
 def test_it_is_short() -> None:
-    texts = [path.read_text(encoding="utf-8") for path in (*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md")]
-    assert len(texts) <= 25
+    pages = [*DOCS.rglob("*.md")]
+    texts = [path.read_text(encoding="utf-8") for path in (*pages, ROOT / "CONTRIBUTING.md")]
+    assert len(pages) <= 25
     assert sum(len(re.findall(r"\S*\w\S*", text)) for text in texts) <= 15_000
 
 

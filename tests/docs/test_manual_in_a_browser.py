@@ -13,9 +13,8 @@ from tests.docs.test_manual import pages, site
 from tests.support.browser import chromium
 
 __all__ = ["site"]
-PHONE = 390
-WIDE = 1300
-SCREEN, SCREENS = 1000, 10
+PHONE, WIDE = (390, 844), (1300, 1000)
+SCREENS = 10
 LOOK = """() => {
   const count = (all, fault) => [...document.querySelectorAll('.md-typeset ' + all)].filter(fault).length;
   return [document.documentElement.scrollHeight, count('pre > code', e => e.scrollWidth > e.clientWidth + 1),
@@ -41,7 +40,7 @@ def address(site: Path) -> Iterator[str]:
 @pytest.mark.long
 def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> None:
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": PHONE, "height": 844})
+        page = browser.new_page(viewport={"width": PHONE[0], "height": PHONE[1]})
         asked: list[str] = []
         failed: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
@@ -52,7 +51,7 @@ def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> No
             if path.name == "index.html":
                 where = path.parent.relative_to(site).as_posix()
                 page.goto(address + ("" if where == "." else where + "/"))
-                if page.evaluate("document.documentElement.scrollWidth") > PHONE:
+                if page.evaluate("document.documentElement.scrollWidth") > PHONE[0]:
                     wide.append(where)
         own = (address, "data:", "blob:")
         assert [url for url in asked if not url.startswith(own)] == []
@@ -61,16 +60,16 @@ def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> No
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("width", [WIDE, PHONE])
-def test_pages_are_short_and_break_no_name(site: Path, address: str, width: int) -> None:
+@pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
+def test_pages_are_short_and_break_no_name(site: Path, address: str, width: int, screen: int) -> None:
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": width, "height": SCREEN})
+        page = browser.new_page(viewport={"width": width, "height": screen})
         faults = []
         for path in pages(site):
             if path.name == "index.html":
                 where = path.parent.relative_to(site).as_posix()
                 page.goto(address + ("" if where == "." else where + "/"))
                 height, cut, broken = page.evaluate(LOOK)
-                if broken or (width == WIDE and (height > SCREENS * SCREEN or cut)):
+                if broken or height > SCREENS * screen or (cut and width == WIDE[0]):
                     faults.append((where, height, cut, broken))
         assert faults == []

@@ -13,9 +13,10 @@ from tests.support.browser import chromium, opened, until
 from tests.support.replays import ATTACK, hostile, short
 
 import posse
-from posse.rendering.style import GROUND, TARGET
+from posse.rendering.style import GROUND, PAPER, TARGET
 from posse_baselines import Recorder
 from posse_training.replay import RECORD, read_replay, record, replay_of, write_replay
+from posse_training.replay.page import DARK
 from posse_training.replay.words import command, verdict
 
 if TYPE_CHECKING:
@@ -110,6 +111,8 @@ def test_the_head_says_what_happened_what_one_sees_and_how_to_make_it_again(
     replay = read_replay(written)
     with opened(browser, written, "#t=0", size=size, dark=dark) as page:
         assert page.locator("#verdict").inner_text() == verdict(replay)
+        paper = DARK["PAPER"] if dark else PAPER
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == f"rgb{paper}"
         assert page.locator("#made code").inner_text() == command(replay)
         for part in ("#verdict", "#seen", "#made a"):
             box = page.locator(part).bounding_box()

@@ -28,6 +28,27 @@ TASK_COLOURS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), (0, 114, 178), 
 which deuteranopia maps to the grey of a tracker."""
 PLAYERS: Final[tuple[style.Colour, ...]] = ((0, 114, 178), style.INK, (40, 165, 130), (140, 60, 160))
 """Of the teams compared in one replay or film, left to right: none is near the vermilion of target and slots."""
+DARK: Final[dict[str, style.Colour]] = {
+    "PAPER": (24, 27, 32),
+    "GROUND": (18, 20, 24),
+    "GRID": (58, 64, 72),
+    "WALL": (140, 147, 157),
+    "OBSTACLE": (62, 68, 76),
+    "OBSTACLE_RIM": (96, 103, 112),
+    "INK": (228, 231, 235),
+    "FAINT_INK": (154, 161, 171),
+    "TARGET": (240, 124, 48),
+    "SLOT": (150, 92, 52),
+    "SLOT_FILLED": (92, 58, 36),
+    "TRACKER_RIM": (205, 210, 217),
+    "BROKEN": (70, 75, 82),
+    "LINK": (86, 180, 233),
+    "SENSING": (30, 42, 54),
+    "SENSING_RIM": (52, 78, 102),
+    "CONTACT": (244, 84, 110),
+}
+"""Colours of the page where the browser prefers a dark scheme; the others are the same."""
+DARK_PLAYERS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), DARK["INK"], (60, 190, 150), (190, 120, 210))
 MODULES: Final = tuple(
     f"{name}.js"
     for name in (
@@ -121,6 +142,8 @@ def colours() -> dict[str, Any]:
         **{name: css(colour) for name, colour in vars(style).items() if isinstance(colour, tuple)},
         "TASKS": [css(colour) for colour in TASK_COLOURS],
         "PLAYERS": [css(colour) for colour in PLAYERS],
+        "DARK": {name: css(colour) for name, colour in DARK.items()}
+        | {"PLAYERS": [css(colour) for colour in DARK_PLAYERS]},
     }
 
 

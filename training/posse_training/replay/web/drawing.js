@@ -1,8 +1,8 @@
 // Colours, strokes and marks that pictures, timeline and legend share.
 import { readJson } from "./data.js";
 
-export const colours = readJson("colours"); // those of figures and films
-
+export const colours = readJson("colours"); // those of figures and films, and what differs in the dark
+if (matchMedia("(prefers-color-scheme: dark)").matches) Object.assign(colours, colours.DARK);
 for (const [name, value] of Object.entries(colours)) {
   if (typeof value === "string") {
     document.documentElement.style.setProperty(`--${name.toLowerCase().replaceAll("_", "-")}`, value);

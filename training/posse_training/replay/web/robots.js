@@ -15,7 +15,7 @@ export function trails(d) {
     const [xs, ys, k] = d.columns(i);
     const isTarget = i === settings.num_trackers;
     const chosen = i === d.robot && !isTarget;
-    const colour = isTarget ? colours.TARGET : chosen ? colours.INK : colours.TRAIL;
+    const colour = isTarget ? colours.TARGET : chosen ? colours.INK : colours.TRACKER;
     for (let band = 0; band < BANDS; band++) {
       const to = end - (length * (BANDS - 1 - band)) / BANDS;
       if (to < 0) continue;
