@@ -8,6 +8,7 @@ Writes a row of benchmarks/algorithms.csv for each run. Runs with a row are skip
 from __future__ import annotations
 
 import csv
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,17 +27,11 @@ from posse_training.train.train import train
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 COLUMNS: Final = (
-    *("algorithm", "scenario", "version", "training_seed", "steps", "worlds", "seed"),
+    *("algorithm", "safeguard", "scenario", "version", "training_seed", "steps", "worlds", "seed"),
     *("safe_score", "low", "high", "score", "contact_free", "area", "steps_per_second", "commit"),
 )
-CHANGES: Final[dict[str, dict[str, Any]]] = {
-    "ppo": {},
-    "mappo": {"algorithm": "mappo"},
-    "sac": {"algorithm": "sac"},
-    "td3": {"algorithm": "td3"},
-    "ppo-imitation": {"imitate": "ddcs-tuned", "safeguard": False},
-}
-"""Settings of each algorithm beyond the defaults of its class."""
+ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
+NAMES: Final = ("algorithm", "safeguard", "scenario", "training_seed")
 OFF_POLICY: Final = ("sac", "td3")
 TEST_SEED: Final = 7
 
@@ -45,10 +40,12 @@ TEST_SEED: Final = 7
 class Settings:
     """Command-line arguments."""
 
-    algorithm: tuple[str, ...] = tuple(CHANGES)
+    algorithm: tuple[str, ...] = ALGORITHMS
+    safeguard: tuple[bool, ...] = (True, False)
+    """Behind the safeguard, and without it."""
     scenario: tuple[str, ...] = ("smart", "radio", "field")
     seed: tuple[int, ...] = (1, 2, 3)
-    steps: int = 10_000_000
+    steps: int = 20_000_000
     """Steps of training; a step is one control step of one tracker."""
     off_policy_steps: int = 1_000_000
     """The same for sac and td3, whose steps take longer."""
@@ -57,17 +54,16 @@ class Settings:
     out: Path = Path("runs/algorithms")
 
 
-def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainSettings:
+def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, seed: int) -> TrainSettings:
     """Return the settings of one run."""
-    changes = dict(CHANGES[algorithm])
-    base = default_settings(scenario, changes.pop("algorithm", "ppo"), preset="nothing")
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
-    folder = s.out / f"{algorithm}-{scenario}-{seed}"
+    folder = s.out / f"{algorithm}-{'safe' if safeguard else 'bare'}-{scenario}-{seed}"
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
-    return replace(base, **changes, **run, tensorboard=False, beside=None)
+    base = default_settings(scenario, algorithm, preset="nothing")
+    return replace(base, **run, safeguard=safeguard, tensorboard=False, beside=None)
 
 
-def row_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]:
+def row_of(run: TrainSettings, worlds: int) -> dict[str, Any]:
     """Return the row of a finished run: its last policy on test worlds, and the area under its curve."""
     policy = load(str(run.run_folder / LAST))
     card: dict[str, Any] = policy.card  # type: ignore[attr-defined]
@@ -78,7 +74,16 @@ def row_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]:
     area = float(np.trapezoid(scores, steps) / steps[-1])
     numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean(), area)
     values = (
-        *(algorithm, run.scenario, results.scenario.version, run.seed, card["steps"], worlds, TEST_SEED),
+        *(
+            run.algorithm,
+            run.safeguard,
+            run.scenario,
+            results.scenario.version,
+            run.seed,
+            card["steps"],
+            worlds,
+            TEST_SEED,
+        ),
         *(f"{number:.6f}" for number in numbers),
         *(round(last["steps"] / last["seconds"]), commit()),
     )
@@ -89,14 +94,16 @@ def main() -> None:
     """Train what has no row yet."""
     s = tyro.cli(Settings, description=__doc__)
     with TABLE.open(newline="", encoding="utf-8") as file:
-        done = {(row["algorithm"], row["scenario"], int(row["training_seed"])) for row in csv.DictReader(file)}
+        done = {tuple(row[name] for name in NAMES) for row in csv.DictReader(file)}
     console = Console()
-    todo = [(a, c, n) for n in s.seed for c in s.scenario for a in s.algorithm if (a, c, n) not in done]
-    for algorithm, scenario, seed in todo:
-        run = settings_of(s, algorithm, scenario, seed)
+    for seed, scenario, safeguard, algorithm in itertools.product(s.seed, s.scenario, s.safeguard, s.algorithm):
+        if (algorithm, str(safeguard), scenario, str(seed)) in done:
+            continue
+        run = settings_of(s, algorithm, safeguard, scenario, seed)
         train(run, console=console)
+        row = row_of(run, s.worlds)
         with TABLE.open("a", newline="", encoding="utf-8") as file:
-            csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(row_of(run, algorithm, s.worlds))
+            csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(row)
 
 
 if __name__ == "__main__":

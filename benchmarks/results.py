@@ -40,9 +40,10 @@ class Settings:
 
 
 def plays(name: str, scenario: str) -> bool:
-    """Return whether a policy has a row on a scenario: learned ones on their own, a generalist on all."""
+    """Return whether a policy has a row on a scenario: learned ones on their own and on robots, a generalist on all."""
     own = name.removeprefix("learned-").removeprefix("corrected-")
-    return scenario in ONLY.get(name, SCENARIOS) and (own == name or own in (scenario, "generalist"))
+    fits = own in (name, scenario, "generalist") or scenario == "robots"
+    return scenario in ONLY.get(name, SCENARIOS) and fits
 
 
 def main() -> None:

@@ -38,14 +38,11 @@ def all_settings() -> str:
 
 def training_defaults() -> str:
     """Return the settings of a training by ``ppo`` that differ most between scenarios."""
-    names = ("steps", "encoding", "advise", "correction")
+    names = ("steps", "encoding", "log_deviation", "discount")
     rows = []
     for scenario in posse.scenario_names():
         chosen = default_settings(scenario, preset="residual").to_dict()
-        shown = {name: "" if chosen[name] is None else code(chosen[name]) for name in names}
-        if chosen["advise"] is None:
-            shown["correction"] = ""
-        rows.append((code(scenario), f"{chosen['steps']:,}", *(shown[name] for name in names[1:])))
+        rows.append((code(scenario), f"{chosen['steps']:,}", *(code(chosen[name]) for name in names[1:])))
     return table(("scenario", *(code(f"--{name.replace('_', '-')}") for name in names)), rows)
 
 

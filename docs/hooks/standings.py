@@ -86,15 +86,17 @@ def algorithms() -> str:
     """Return what algorithms reach from nothing: the mean of their training seeds, and their range."""
     runs = _rows(RESULTS / "algorithms.csv")
     rows = []
-    for scenario, name in sorted({(run["scenario"], run["algorithm"]) for run in runs}):
-        mine = [run for run in runs if (run["scenario"], run["algorithm"]) == (scenario, name)]
+    names = ("scenario", "algorithm", "safeguard")
+    for which in sorted({tuple(run[name] for name in names) for run in runs}):
+        mine = [run for run in runs if tuple(run[name] for name in names) == which]
         safe = [float(run["safe_score"]) for run in mine]
         spread = f" [{min(safe):.3f}, {max(safe):.3f}]" if len(safe) > 1 else ""
-        contact = 1 - _mean(float(run["contact_free"]) for run in mine)
+        score, contact = (_mean(float(run[name]) for run in mine) for name in ("score", "contact_free"))
+        layer = "safeguard" if which[2] == "True" else "bare"
         steps = f"{float(mine[0]['steps']) / 1e6:.0f} M"
-        area = f"{_mean(float(run['area']) for run in mine):.3f}"
-        rows.append((code(scenario), name, steps, len(mine), f"{_mean(safe):.3f}{spread}", f"{contact:.1%}", area))
-    header = ("scenario", "algorithm", "steps", "seeds", "safe score [least, greatest]", "worlds with contact", "area")
+        numbers = (f"{_mean(safe):.3f}{spread}", f"{score:.3f}", f"{1 - contact:.1%}")
+        rows.append((code(which[0]), which[1], layer, steps, len(mine), *numbers))
+    header = ("scenario", "algorithm", "behind", "steps", "seeds", "safe score [least, greatest]", "score", "contact")
     return table(header, rows)
 
 

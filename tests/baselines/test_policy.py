@@ -46,7 +46,7 @@ def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[list[Any], li
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_game_that_was_pickled_out_of_band_goes_on_alike(name: str) -> None:
+def test_an_episode_unpickled_from_buffers_goes_on_as_before(name: str) -> None:
     policy = load(name)
     batch = batch_for(policy, "field", 2)
     observations, memory = batch.reset(seed=1), begin(policy, batch)

@@ -175,14 +175,14 @@ def safe_score(target: str) -> float:
 
 
 @pytest.mark.long
-def test_none_costs_the_tuned_script_more_than_a_tenth() -> None:
+def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
     own = safe_score("smart")
     for name in ("constant", *OPEN_LOOP):
         assert safe_score(name) > own - 0.1, name
 
 
 @pytest.mark.parametrize(("name", "turns"), [("left-circle", 1.0), ("right-circle", -1.0), ("wide-circle", 0.5)])
-def test_a_circle_is_one(name: str, turns: float) -> None:
+def test_a_circling_target_drives_a_circle(name: str, turns: float) -> None:
     batch = posse.batch("duel", 3, target_policy=load_target(name).policy)
     poses = rollout(batch, load("idle"), ["target_pose"], steps=40)["target_pose"]
     scenario = batch.scenario
@@ -194,7 +194,7 @@ def test_a_circle_is_one(name: str, turns: float) -> None:
     assert (speed >= scenario.target_speed * 0.98).all()
 
 
-def test_the_clock_starts_anew_with_a_world() -> None:
+def test_an_open_loop_target_restarts_with_its_world() -> None:
     policy = OPEN_LOOP["stop-and-go"]
     clock = policy.begin(posse.batch("duel", 2).layout, 2)
     row = np.zeros((2, 1, 1), np.float32)

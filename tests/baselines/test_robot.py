@@ -101,7 +101,7 @@ def test_robots_that_hear_each_other_take_their_slots() -> None:
     assert gaps.min(axis=1).max() < 0.1
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_invalid_measurements_are_refused() -> None:
     robot = Robot("field", 1)
     beams = robot.scenario.sonar_beams
     before = robot.observe((0.0, 0.0, 0.0), 0.1, 0.0)

@@ -120,7 +120,7 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
 
 
-def test_what_cannot_be_guarded() -> None:
+def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(posse.parallel_env("smart", discrete_actions=True))
     with pytest.raises(PolicyError, match="discrete_actions=False"):

@@ -60,7 +60,7 @@ def pages(site: Path) -> list[Path]:
     return found
 
 
-def test_it_is_short() -> None:
+def test_the_manual_is_short() -> None:
     pages = [*DOCS.rglob("*.md")]
     texts = [path.read_text(encoding="utf-8") for path in (*pages, ROOT / "CONTRIBUTING.md")]
     assert len(pages) <= 25

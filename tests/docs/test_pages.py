@@ -96,7 +96,7 @@ def test_the_notebook_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_it_measures(tmp_path: Path) -> None:
+def test_the_speed_benchmark_measures(tmp_path: Path) -> None:
     printed(ROOT / "benchmarks" / "speed.py", "--worlds", "2", "--no-cold", "--seconds", "0.01", cwd=tmp_path)
     figures = json.loads((tmp_path / "runs" / "bench" / "speed.json").read_text(encoding="utf-8"))
     assert {"machine", "batches", "one_world"} <= figures.keys()

@@ -12,7 +12,7 @@ MOST_LINES = {"walls": 8, "closing": 12, "steady": 6, "spiral": 15, "bearing": 2
 
 
 @pytest.mark.parametrize("name", MOST_LINES)
-def test_an_example_is_short(name: str) -> None:
+def test_the_examples_of_extend_are_short(name: str) -> None:
     assert lines_of(EXAMPLES[name]) <= MOST_LINES[name]
 
 

@@ -202,7 +202,7 @@ def test_a_team_that_forms_up_goes_as_an_independent_computation_says(case: int)
     judge(batch, observations, 0, "forms", every=6 if batch.scenario.num_trackers < 12 else 24)
 
 
-def test_in_these_worlds_all_happens_that_is_compared() -> None:
+def test_the_random_worlds_exercise_every_rule_compared() -> None:
     seen: dict[str, list[float]] = {}
     for case in range(len(CASES)):
         (batch, _), rng = started(case), np.random.default_rng(0)

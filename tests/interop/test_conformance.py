@@ -101,13 +101,13 @@ CHECKS: tuple[Callable[[Settings], None], ...] = (
 @pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL", "ignore:Environment's m:UserWarning")
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("check", CHECKS)
-def test_many_agents(check: Callable[[Settings], None], variant: str) -> None:
+def test_environments_of_many_agents_conform(check: Callable[[Settings], None], variant: str) -> None:
     check(VARIANTS[variant])
 
 
 @pytest.mark.parametrize("variant", [name for name in VARIANTS if "target_motion" not in VARIANTS[name]])
 @pytest.mark.parametrize("name", ["Team", "Solo", "Tracker"])
-def test_one_agent(name: str, variant: str) -> None:
+def test_environments_of_one_agent_conform(name: str, variant: str) -> None:
     settings = {**VARIANTS[variant], "horizon": 8}
     if name == "Solo":
         settings |= {"num_trackers": 1, "breaks": 0}

@@ -36,7 +36,7 @@ def test_one_observation_plays_each_tracker() -> None:
             np.testing.assert_allclose(actions[e, i], expected, rtol=1e-5, atol=1e-5)
 
 
-def test_discrete_actions_and_silence() -> None:
+def test_discrete_actions_and_absent_messages_are_played() -> None:
     env = gymnasium.make("posse/Tracker-v0", discrete_actions=True)
     model = DQN("MlpPolicy", env, device="cpu", buffer_size=10)
     said = load("ddcs-distributed").message_size
@@ -46,7 +46,7 @@ def test_discrete_actions_and_silence() -> None:
     assert not actions[..., 2:].any()
 
 
-def test_encoded_observations() -> None:
+def test_encoded_observations_are_played() -> None:
     batch = posse.batch("constant", 2, autoreset="disabled")
     encoding = Encoding.of(batch.layout, "slots", neighbours=2)
     model = PPO("MlpPolicy", TeamVecEnv([batch], encoding), n_steps=8, batch_size=80, device="cpu")
@@ -68,7 +68,7 @@ def test_behind_the_safeguard() -> None:
     np.testing.assert_array_equal(actions, guard.actions(wanted))
 
 
-def test_a_function_plays() -> None:
+def test_a_function_plays_as_a_policy() -> None:
     def ahead(observations: Any) -> Any:
         return np.full((*observations.shape[:2], 2), 0.5)
 

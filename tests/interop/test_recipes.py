@@ -41,13 +41,13 @@ def names() -> list[str]:
         if name not in OWN_ENVIRONMENT
     ],
 )
-def test_it_runs(name: str, tmp_path: Path) -> None:
+def test_a_recipe_runs(name: str, tmp_path: Path) -> None:
     run(name, tmp_path)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
-def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
+def test_a_recipe_runs_in_an_environment_of_its_own(name: str, tmp_path: Path) -> None:
     folder = OWN_ENVIRONMENT[name]
     python = ROOT / f".venv-{folder}" / "bin" / "python"
     if not python.exists():
@@ -68,7 +68,7 @@ def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", names())
-def test_it_is_short_and_on_the_page(name: str) -> None:
+def test_a_recipe_is_short_and_on_the_page(name: str) -> None:
     lines = (RECIPES / f"{name}.py").read_text(encoding="utf-8").splitlines()
     assert len([line for line in lines if line.strip()]) <= LONGER.get(name, LONGEST)
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))

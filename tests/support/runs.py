@@ -107,13 +107,7 @@ ADVISED: dict[str, Any] = {
     "advise": "ddcs-distributed",
     "overrides": {"horizon": HORIZON, "settle_time": 1.0},
 }
-BELIEVING: dict[str, Any] = {
-    **ADVISED,
-    "advise": "ddcs-tuned",
-    "correction": "velocity",
-    "encoding": "belief",
-    "end_on_contact": True,
-}
+BELIEVING: dict[str, Any] = {**ADVISED, "advise": "ddcs-tuned", "encoding": "belief", "end_on_contact": True}
 """With the settings of a correction: adviser, belief, a contact ends an episode."""
 GUARDED: dict[str, Any] = {
     "scenario": "smart",

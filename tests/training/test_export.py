@@ -32,7 +32,7 @@ SHIPPED = shipped() | shipped_targets()
 
 @pytest.mark.long
 @pytest.mark.skipif(HERE, reason="they run here")
-def test_they_run_where_onnx_is(tmp_path: Path) -> None:
+def test_exports_are_tested_where_onnx_is_installed(tmp_path: Path) -> None:
     if not ELSEWHERE.exists():
         pytest.skip("needs .venv-recipes: make recipes")
     paths = [str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
@@ -95,29 +95,18 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
 
 
 @needs_onnx
-@pytest.mark.parametrize("correction", ["motion", "velocity"])
-def test_twice_a_correction_is_added_to_what_the_script_proposes(correction: str, tmp_path: Path) -> None:
+def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path) -> None:
     script = DDCS()
     batch, observations = observations_of("smart", message_size=script.message_size)
-    memory = script.begin(batch.layout, 6)
-    if correction == "velocity":
-        encoding = Encoding.of(batch.layout, "belief")
-        further, memory = script.propose(observations, memory, believes=True)
-    else:
-        encoding = Encoding.of(batch.layout)
-        action, memory = script.act(observations, memory)
-        further = action[..., :2]
-    network = network_for(encoding.size + further.shape[-1])
-    policy = LearnedPolicy(network, encoding, {}, load("ddcs-distributed"), correction)
+    encoding = Encoding.of(batch.layout, "belief")
+    further, memory = script.propose(observations, script.begin(batch.layout, 6), believes=True)
+    policy = LearnedPolicy(network_for(encoding.size + further.shape[-1]), encoding, {}, load("ddcs-distributed"))
     wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
     encoded = Encoder(encoding, batch.layout).encode(observations)
     rows = np.concatenate([encoded, further.reshape(len(encoded), -1)], axis=1)
     change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
-    if correction == "velocity":
-        action, _ = script.carry_out(observations, memory, change)
-    else:
-        action[..., :2] += change
-    np.testing.assert_allclose(np.clip(action, -1, 1), wanted, rtol=0, atol=1e-5)
+    action, _ = script.carry_out(observations, memory, change)
+    np.testing.assert_allclose(action, wanted, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize(("words", "found"), [("pursuit --out x.onnx", "pursuit"), ("evader --out x.pb", "x.pb")])

@@ -37,7 +37,7 @@ def test_what_sets_nothing_is_refused(words: str, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(("words", "ray"), [("", False), ("--ray", True), ("--ray 10.0.0.1:6379", "10.0.0.1:6379")])
-def test_which_cluster(words: str, ray: bool | str) -> None:
+def test_the_address_of_a_cluster_is_read(words: str, ray: bool | str) -> None:
     assert tyro.cli(Settings, args=["idle", *words.split()]).ray == ray
 
 

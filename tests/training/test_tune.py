@@ -62,7 +62,7 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
         (["pngl", "--only", "gian"], "only='gian' is not a tunable setting of 'pngl'"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_is_made(
+def test_invalid_settings_are_refused_before_anything_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     out = tmp_path / "run"
@@ -90,7 +90,7 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
         tune(small(tmp_path / "run"), console=quiet())
 
 
-def test_nothing_has_an_effect(tmp_path: Path) -> None:
+def test_a_search_without_any_effect_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
 

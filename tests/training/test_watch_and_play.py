@@ -80,7 +80,7 @@ def test_a_page_is_recorded_and_opened(
         (["play", "idle"], "no window can be opened"),
     ],
 )
-def test_mistakes_are_named(
+def test_invalid_arguments_are_named(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):

@@ -1,18 +1,10 @@
 """A scripted adviser beside a learned policy (residual policy learning).
 
-At each step the adviser proposes something, the network reads the proposal together with the
-observation, and its output corrects the proposal. Two things can be corrected:
-
-``motion``: the adviser's action. The action is the proposal plus twice the output, clipped to
-[-1, 1].
-
-``velocity``: the velocity that the adviser wants, before its safeguard against contact. Whatever the
-network does, the safeguard comes after it.
-
-An output of zero reproduces the adviser, and every motion stays reachable. The adviser's messages
-are sent unchanged, and its memory is its own, so the network needs no memory. With ``believes`` the
-network also reads what the adviser believes. References: Silver et al. 2018, Johannink et al. 2019;
-Alshiekh et al. 2018 (safeguard).
+At each step the adviser, a team of the DDCS, proposes the velocity that it wants, the network reads the proposal
+together with the observation, and twice its output is added to the proposal, before the adviser's safeguard against
+contact. An output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are sent
+unchanged, and its memory is its own, so the network needs no memory. With ``believes`` the network also reads what the
+adviser believes. References: Silver et al. 2018, Johannink et al. 2019; Alshiekh et al. 2018 (safeguard).
 """
 
 from __future__ import annotations
@@ -32,8 +24,6 @@ REACH: Final = np.float32(2.0)
 """Factor of the network's output: spans the whole of [-1, 1] from either end."""
 MOTION: Final = 2
 """Numbers of an action that move the tracker; a proposal adds as many inputs."""
-CORRECTIONS: Final = ("motion", "velocity")
-"""What the output corrects."""
 
 
 class Advising:
@@ -41,42 +31,29 @@ class Advising:
 
     Args:
         adviser: The policy that proposes, one of the DDCS.
-        correction: One of :data:`CORRECTIONS`.
-        believes: Whether the network reads the adviser's belief, as only one that corrects a velocity can.
+        believes: Whether the network reads the adviser's belief.
 
     Attributes:
         inputs: How many numbers the network reads in addition to its encoding.
 
     Raises:
-        PolicyError: Another policy or correction, or a belief beside a correction of the motion.
+        PolicyError: Another policy.
     """
 
-    def __init__(self, adviser: Policy, correction: str = "motion", *, believes: bool = False) -> None:
-        if correction not in CORRECTIONS:
-            raise PolicyError(f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}")
+    def __init__(self, adviser: Policy, *, believes: bool = False) -> None:
         if not isinstance(adviser, DDCS):
             raise PolicyError(f"{adviser.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
-        if believes and correction == "motion":
-            raise PolicyError('the encoding "belief" goes with correction="velocity": use that, or another encoding')
-        self.adviser, self.correction = adviser, correction
+        self.adviser = adviser
         self.inputs = MOTION + (BELIEF_SIZE if believes else 0)
         self._believes = believes
 
-    def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, FloatArray, Memory]:
-        """Return the network's further inputs (E, N, k), what :meth:`answer` needs (E, N, ...), and the memory."""
-        if self.correction == "motion":
-            actions, memory = self.adviser.act(observations, memory)
-            return actions[..., :MOTION], actions, memory
-        proposals, memory = self.adviser.propose(observations, memory, believes=self._believes)
-        return proposals, observations, memory
+    def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return the network's further inputs (E, N, k) and the adviser's memory."""
+        return self.adviser.propose(observations, memory, believes=self._believes)
 
-    def answer(self, asked: FloatArray, outputs: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N, 2 + m) for what :meth:`ask` returned and the network's outputs (E, N, 2)."""
-        if self.correction == "velocity":
-            return self.adviser.carry_out(asked, memory, REACH * outputs)
-        actions = asked.copy()
-        actions[..., :MOTION] += REACH * outputs
-        return np.clip(actions, np.float32(-1.0), np.float32(1.0)), memory
+    def answer(self, observations: FloatArray, outputs: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N, 2 + m) for the observations asked about and the network's outputs (E, N, 2)."""
+        return self.adviser.carry_out(observations, memory, REACH * outputs)
 
 
 class Advice:
@@ -94,13 +71,13 @@ class Advice:
         self._advising = advising
         self._memory = begin(advising.adviser, batch)
         worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
-        size = batch.layout.size if advising.correction == "velocity" else MOTION + batch.scenario.message_size
         self.inputs = np.zeros((worlds, trackers, advising.inputs), np.float32)
-        self._asked = np.zeros((worlds, trackers, size), np.float32)
+        self._asked = np.zeros((worlds, trackers, batch.layout.size), np.float32)
 
     def follow(self, observations: FloatArray) -> None:
         """Ask for advice on the observations (E, N, F) after a step."""
-        self.inputs[...], self._asked[...], self._memory = self._advising.ask(observations, self._memory)
+        self._asked[...] = observations
+        self.inputs[...], self._memory = self._advising.ask(observations, self._memory)
 
     def actions(self, outputs: FloatArray) -> FloatArray:
         """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2)."""

@@ -54,9 +54,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         network: Computes the actions.
         encoding: The network's inputs.
         card: Describes the policy: ``name``, ``side``, ``trained_splits``, and anything else on record.
-        adviser: Scripted policy whose proposals the network refines, if any
+        adviser: Scripted policy whose wanted velocity the network corrects, if any
             (:mod:`posse_baselines.learned.advice`).
-        correction: What the network's output corrects: ``"motion"`` or ``"velocity"``.
         safeguard: Whether its actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
 
@@ -74,12 +73,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         encoding: Encoding,
         card: Mapping[str, Any],
         adviser: Policy | None = None,
-        correction: str = "motion",
         safeguard: bool = False,
     ) -> None:
         if adviser is None and encoding.believes:
             raise PolicyError("a policy that reads an adviser's belief needs an adviser")
-        self._advising = None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
+        self._advising = None if adviser is None else Advising(adviser, believes=encoding.believes)
         size = encoding.size + (0 if self._advising is None else self._advising.inputs)
         if network.inputs != size:
             raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
@@ -151,10 +149,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 m.guard.follow(observations)
                 actions = m.guard.actions(actions)
             return actions, m
-        further, asked, advised = self._advising.ask(observations, m.adviser)
+        further, advised = self._advising.ask(observations, m.adviser)
         inputs = np.concatenate([m.encoder.encode(observations), further.reshape(-1, further.shape[-1])], axis=1)
         corrections = forward(self._flat, inputs).reshape(*team, MOTION)
-        actions, advised = self._advising.answer(asked, corrections, advised)
+        actions, advised = self._advising.answer(observations, corrections, advised)
         return actions, m._replace(adviser=advised)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -186,7 +184,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "encoding": self.encoding.to_dict(),
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
-            "correction": "motion" if self._advising is None else self._advising.correction,
             "safeguard": self.safeguard,
         }
 
@@ -236,7 +233,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 encoding,
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
-                str(description["correction"]),
                 bool(description.get("safeguard", False)),
             )
         except PolicyError as error:

@@ -1,4 +1,4 @@
-"""The belief planner: plays ahead as the planner does, in a world of each tracker's own that its observations wrote.
+"""The belief planner: plays ahead as the planner does, in a world that each tracker keeps of what it observes.
 
 What a tracker is told belongs to the moment at which it was measured or sent: it is written into the world as it was
 then, and the world is stepped from there to the present with the actions that were planned meanwhile. So a late fix

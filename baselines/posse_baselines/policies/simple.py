@@ -1,4 +1,4 @@
-"""Policies to measure others against: they know nothing, and do as little."""
+"""Lower bounds for comparisons: policies that stand still or act at random."""
 
 from __future__ import annotations
 

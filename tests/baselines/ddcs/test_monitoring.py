@@ -76,7 +76,7 @@ def way(belief: npt.NDArray[np.float32], at: int, scale: float) -> Complexes:
     return np.asarray(soft * scale / (1.0 - np.abs(soft)))
 
 
-def test_a_team_in_formation_believes_what_is_so() -> None:
+def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     ddcs = DDCS()
     batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
@@ -106,7 +106,7 @@ def test_a_team_in_formation_believes_what_is_so() -> None:
     assert ((belief[..., LOOKS_AT:] >= 0.0) & (belief[..., LOOKS_AT:] <= 1.0)).all()
 
 
-def test_who_searches_believes_nothing_of_the_target() -> None:
+def test_a_searcher_has_no_estimate_of_the_target() -> None:
     ddcs = DDCS()
     batch = posse.batch("search", 8, message_size=ddcs.message_size)
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
@@ -159,7 +159,7 @@ def test_the_way_past_a_row_is_past_its_end() -> None:
     assert right == pytest.approx(-math.asin(0.8 / 1.5))
 
 
-def test_enclosed_there_is_no_way() -> None:
+def test_an_enclosed_robot_finds_no_detour() -> None:
     ring = [(math.cos(a), math.sin(a), 0.6) for a in np.arange(8) * math.pi / 4]
     assert abs(turn(ring, 1.0)) > 2.0
     assert abs(turn(ring, -1.0)) > 2.0

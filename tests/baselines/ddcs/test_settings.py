@@ -48,7 +48,7 @@ def test_both_ends_of_each_range_can_be_played() -> None:
         assert np.isfinite(play(batch, DDCS.of("pngl-l-phi").with_settings(**values))["score"]).all()
 
 
-def test_only_the_family_has_settings() -> None:
+def test_other_policies_have_no_settings_of_the_ddcs() -> None:
     with pytest.raises(PolicyError, match="policy 'idle' has no settings; those that have: pngl-l"):
         tunables(DDCS.of("idle").settings)
     with pytest.raises(TypeError, match="gian"):

@@ -61,7 +61,7 @@ def test_converging_and_flocking_change_with_hysteresis() -> None:
 # --- what each does ------------------------------------------------------------------------------
 
 
-def test_who_converges_goes_at_full_speed_and_who_flocks_as_the_formation() -> None:
+def test_converging_is_at_full_speed_and_flocking_at_the_formations() -> None:
     converging, flocking = [], []
     for step, now in enumerate(drive("pngl-l-phi", "constant", 20, 300, split="train")):
         speed, task = now.commands[..., 0], now.notes["task"]
@@ -88,7 +88,7 @@ def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> N
             assert far[-1] < far[0] - 0.9 * 0.4 * 10.0  # it gains 0.4 m/s on the flock
 
 
-def test_who_hears_of_another_leader_holds_the_flock_s_course() -> None:
+def test_a_tracker_that_hears_of_another_leader_holds_the_flocks_course() -> None:
     speeds = []
     for now in drive("pngl-l-phi", "leader-loss", 20, 250, split="train", radio_delay=3):
         exchanging = (now.notes["task"] == EXCHANGING) & ~now.broken

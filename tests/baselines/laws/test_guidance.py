@@ -155,7 +155,7 @@ def body(theta: float, dt: float = 0.1, turn_acceleration: float = 1e4) -> Any:
 
 @PROPERTY
 @given(ANGLES, ANGLES, st.floats(0.01, 2.0), st.floats(-0.5, 0.5))
-def test_a_velocity_is_taken_up_the_short_way_and_never_in_reverse(
+def test_regulation_turns_the_short_way_and_never_reverses(
     theta: float, wanted: float, speed: float, rate: float
 ) -> None:
     error = short_way(wanted - theta)
@@ -179,7 +179,7 @@ def test_a_turning_heading_is_reached_and_then_kept(theta: float, wanted: float,
     assert regulate(body(theta), v, rate)[1] == pytest.approx(rate, abs=1e-5)
 
 
-def test_a_velocity_of_nothing_keeps_the_heading() -> None:
+def test_a_zero_velocity_keeps_the_heading() -> None:
     assert regulate(body(0.3), -1e-4 + 1e-4j, 0.0) == (0.0, 0.0)
 
 

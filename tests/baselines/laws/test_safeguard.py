@@ -55,7 +55,7 @@ def towards(place: complex, goal: complex) -> complex:
 @LIMITS
 @pytest.mark.parametrize("offset", [-0.5, -0.1, 0.0, 0.1, 0.5])
 @pytest.mark.parametrize("radius", [0.15, 0.8])
-def test_a_resting_disc_ahead_is_gone_round(limits: tuple[float, float], offset: float, radius: float) -> None:
+def test_a_resting_disc_ahead_is_passed(limits: tuple[float, float], offset: float, radius: float) -> None:
     body, place, reach, least = body_of(0.0, 1.0, limits), -4 + 0j, radius + 0.15, math.inf
     for _ in range(120):
         velocity, _ = safe(body, towards(place, 4 + 0j), (1j * offset - place, 0j, reach, 0.15))

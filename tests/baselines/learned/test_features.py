@@ -68,7 +68,7 @@ def test_fewer_places_keep_the_nearest() -> None:
     np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
 
 
-def test_unknown_kinds() -> None:
+def test_unknown_encodings_are_refused() -> None:
     layout = posse.ObservationLayout(posse.get_scenario("smart"))
     with pytest.raises(PolicyError, match="plain, slots"):
         Encoding.of(layout, "fancy")

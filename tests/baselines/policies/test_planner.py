@@ -71,7 +71,7 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
         observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
 
 
-def test_it_reads_only_the_batch_that_it_was_shown() -> None:
+def test_the_planner_reads_only_the_batch_it_watches() -> None:
     planner, other = load("planner"), posse.batch("smart", 3, num_trackers=3)
     with pytest.raises(PolicyError, match=r"do not hold their state: show it the batch"):
         planner.begin(other.layout, 3)

@@ -73,7 +73,7 @@ class Calls(RuleBasedStateMachine):
 
 
 @pytest.mark.parametrize("kind", MAKERS)
-def test_what_is_refused_changes_nothing_whatever_was_called_before(kind: str) -> None:
+def test_a_refused_call_changes_nothing(kind: str) -> None:
     if kind == "torchrl":
         pytest.importorskip("torchrl", reason="no torchrl: pip install '.[training]'")
     run_state_machine_as_test(

@@ -33,7 +33,7 @@ def vector(name: str = TEAM, **settings: Any) -> TeamVectorEnv:
 @modes
 @names
 @pytest.mark.parametrize("discrete", [False, True])
-def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete: bool) -> None:
+def test_the_vector_environment_agrees_with_gymnasiums(name: str, mode: AutoresetMode, discrete: bool) -> None:
     settings = {**BUSY, "discrete_actions": discrete}
     if name == TEAM:
         settings.update(breaks=1, break_window=(0.2, 0.4))

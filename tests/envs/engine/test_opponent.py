@@ -150,7 +150,7 @@ def test_clipping_is_for_both_sides() -> None:
         np.testing.assert_array_equal(seen, clipped.step((9 * actions_of(step)).clip(-1, 1))[0])
 
 
-def test_what_is_no_target_policy_is_refused() -> None:
+def test_an_object_that_is_no_target_policy_is_refused() -> None:
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
     with pytest.raises(posse.ScenarioError, match="target_policy="):

@@ -110,7 +110,7 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
     assert printed("-c", code).split() == ["False", "(640,", "640,", "3)", "False"]
 
 
-def test_mistakes_are_named() -> None:
+def test_invalid_arguments_are_named() -> None:
     batch = posse.batch("smart", 2)
     with pytest.raises(ValueError, match=r"size=\(100, 400\).*at least 200 px"):
         Renderer(batch.scenario, size=(100, 400))

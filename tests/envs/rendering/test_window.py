@@ -86,7 +86,7 @@ def test_speed_is_that_of_the_world_and_can_be_changed() -> None:
     renderer.close()
 
 
-def test_the_callers_keys_end_a_pause_and_are_told() -> None:
+def test_the_callers_keys_end_a_pause_and_are_returned() -> None:
     renderer, window, batch = opened({"n": "next"})
     press(pygame.K_x, pygame.K_SPACE, pygame.K_n)
     renderer.draw(batch)

@@ -79,7 +79,7 @@ def test_own_poses_drift_as_random_walks() -> None:
         assert abs(np.mean(error)) < 4 * np.std(error) / math.sqrt(error.size)
 
 
-def test_all_that_a_robot_tells_and_measures_is_placed_by_its_own_pose() -> None:
+def test_what_a_robot_reports_is_placed_by_its_believed_pose() -> None:
     batch = posse.batch("constant", 20, odometry_drift=0.2, heading_drift=0.1)
     batch.reset()
     v, t = batch.layout.views(drive(batch, 50)[-1]), batch.arrays.tracker

@@ -51,7 +51,7 @@ def start(worlds: int, motion: str = "smart", **poses: Any) -> posse.Batch:
 
 
 @pytest.mark.parametrize("team", [steady(0.0), pursuing])
-def test_it_leaves_a_ring_by_the_widest_gap(team: Team) -> None:
+def test_the_target_leaves_a_ring_by_the_widest_gap(team: Team) -> None:
     gaps = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     # Five trackers 60 degrees apart: the gap that is left is 120 degrees wide.
     bearings = gaps[:, None] + np.radians([60, 120, 180, 240, 300])
@@ -64,7 +64,7 @@ def test_it_leaves_a_ring_by_the_widest_gap(team: Team) -> None:
     assert np.abs(left).mean() < np.radians(20)
 
 
-def test_it_turns_on_a_team_that_keeps_station_and_not_before() -> None:
+def test_the_target_darts_at_a_team_in_formation_and_not_before() -> None:
     theta = np.linspace(-3, 3, 24)
     slots = np.array(posse.get_scenario("smart").slot_offsets) @ [1, 1j] * np.exp(1j * theta)[:, None]
     trackers = np.stack([slots.real, slots.imag, np.broadcast_to(theta[:, None], slots.shape)], -1)
@@ -78,14 +78,14 @@ def test_it_turns_on_a_team_that_keeps_station_and_not_before() -> None:
     assert np.argmax(away > np.radians(60), axis=0).max() < 50
 
 
-def test_it_turns_away_from_a_tracker_that_comes_too_near() -> None:
+def test_the_target_turns_away_from_a_near_tracker() -> None:
     # No formation: a single tracker comes from behind at full speed.
     trackers = [[-1.0, 0.0, 0.0], *([-19.0 + k, 0.0, 0.0] for k in range(4))]
     _, heading, _ = play(start(1, tracker_pose=trackers, target_pose=[0.0, 0.0, 0.0]), pursuing, 25)
     assert np.abs(np.angle(heading)).max() > np.radians(60)
 
 
-def test_it_gets_away_from_trackers_that_hold_it_fast() -> None:
+def test_the_target_escapes_trackers_that_enclose_it() -> None:
     # Two stand in its way, touching it, on both sides of where it heads; the others are far off.
     held = [[0.3005 * math.cos(b), 0.3005 * math.sin(b), b] for b in (0.7, -0.7)]
     far = [[-15.0, y, 0.0] for y in (-2.0, 0.0, 2.0)]
@@ -95,7 +95,7 @@ def test_it_gets_away_from_trackers_that_hold_it_fast() -> None:
     assert nearest[-1, 0] > 1.0
 
 
-def test_it_holds_off_a_pursuing_team_longer_than_the_others() -> None:
+def test_the_smart_target_evades_longer_than_the_others() -> None:
     nearest, times = {}, {}
     for motion in ("smart", "constant", "accelerating"):
         _, _, nearest[motion] = play(start(60, motion), pursuing, 400)  # from the same starts
@@ -107,7 +107,7 @@ def test_it_holds_off_a_pursuing_team_longer_than_the_others() -> None:
         assert (times["smart"] > times[other]).mean() > 0.75
 
 
-def test_it_flees_from_trackers_that_work_and_only_steers_clear_of_broken_ones() -> None:
+def test_the_target_flees_working_trackers_and_only_avoids_broken_ones() -> None:
     # One that works comes from behind. Four broken ones ahead leave one way out: straight on,
     # between them, or (with one of them in the way) past it.
     behind, wings = [-4.0, 0.0, 0.0], [[3.0, y, 0.0] for y in (-3.0, -1.5, 1.5)]

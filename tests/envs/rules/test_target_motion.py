@@ -64,7 +64,7 @@ def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     ("name", "low", "high", "deviation"),
     [("world_weave_amplitude", 0.2, 0.45, 0.025), ("world_weave_rate", 0.2, 0.8, 0.03)],
 )
-def test_what_the_accelerating_motion_is_drawn_of_walks_within_its_range(
+def test_the_drawn_numbers_of_the_accelerating_motion_stay_in_range(
     name: str, low: float, high: float, deviation: float
 ) -> None:
     batch = posse.batch("accelerating", 2000, target_turn_rate=0.5, **FAR_AWAY)

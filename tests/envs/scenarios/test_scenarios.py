@@ -72,7 +72,7 @@ def test_obstacles_stand_in_the_view() -> None:
     assert not started("search").state["tracker_sees"].any(), "there sight is short"
 
 
-def test_in_radio_some_depend_on_messages_and_nearly_all_are_in_reach() -> None:
+def test_in_radio_some_trackers_depend_on_messages_and_nearly_all_are_in_range() -> None:
     batch = started("radio")
     sees = batch.state["tracker_sees"] != 0
     assert sees.any(axis=1).mean() > 0.98
@@ -99,7 +99,7 @@ def test_the_paper_is_one_set_up_under_two_names() -> None:
     assert (centralized.num_trackers, centralized.target_motion) == (5, "constant")
 
 
-def test_in_robots_the_target_is_another_of_them() -> None:
+def test_the_target_of_robots_is_a_robot_of_the_same_kind() -> None:
     s = get_scenario("robots")
     wheel = s.target_speed + s.target_turn_rate * s.wheel_base / 2
     assert 0.98 * s.tracker_speeds[0] < wheel <= s.tracker_speeds[0], "as fast as its wheels can"

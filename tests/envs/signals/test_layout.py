@@ -147,7 +147,7 @@ def test_the_largest_worlds_fit_their_memory() -> None:
 
 
 @pytest.mark.parametrize("worlds", [1, 8])
-def test_of_mates_as_near_the_lower_number_comes_first(worlds: int) -> None:
+def test_among_equally_near_mates_the_lower_number_comes_first(worlds: int) -> None:
     batch = posse.batch("constant", worlds, num_trackers=5)
     # Four at the corners of a square round the last, in no order, and nothing to round.
     corners = [(4.0, -4.0, 0.0), (-4.0, 4.0, 0.0), (4.0, 4.0, 0.0), (-4.0, -4.0, 0.0)]

@@ -115,7 +115,7 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
 
 
-def test_who_cannot_play_is_left_out_with_a_line(
+def test_a_policy_that_cannot_play_is_left_out_with_a_line(
     files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     SCENARIOS["few-beams"] = {"sonar_beams": 4}

@@ -53,7 +53,7 @@ def centre_of(picture: Any, colour: tuple[int, int, int]) -> Any:
     return np.array([columns.mean(), rows.mean()])
 
 
-def test_every_number_arrives(browser: Browser, written: Path) -> None:
+def test_every_number_of_a_replay_reaches_the_page(browser: Browser, written: Path) -> None:
     with opened(browser, written, "#t=0") as page:
         for k, player in enumerate(read_replay(written).players):
             assert state(page, f"players[{k}].name") == player.name

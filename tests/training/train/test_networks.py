@@ -74,7 +74,7 @@ def test_the_state_changes_values_but_no_actions(tmp_path: Path) -> None:
         assert (policy.predict_values(rows) - policy.predict_values(other)).abs().max() > 1e-4
 
 
-def test_it_is_the_hyperbolic_tangent() -> None:
+def test_the_fast_tanh_is_the_hyperbolic_tangent() -> None:
     x = torch.cat([torch.linspace(-12, 12, 10_001), torch.tensor([90.0, -90.0, 1e-6, np.inf, -np.inf, np.nan])])
     y = QuickTanh()(x)
     np.testing.assert_allclose(y.numpy(), np.tanh(x.double().numpy()), rtol=0, atol=3e-7)

@@ -42,7 +42,7 @@ from posse_training.train.train import resume, train
         ("ppo", AGAINST),
     ],
 )
-def test_a_training_that_was_cut_ends_where_it_would_have(
+def test_an_interrupted_training_ends_as_an_uninterrupted_one(
     tmp_path: Path, algorithm: str, changes: dict[str, Any]
 ) -> None:
     train(small(tmp_path / "whole", algorithm, **changes), console=quiet())

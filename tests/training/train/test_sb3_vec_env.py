@@ -166,7 +166,7 @@ class TestMethods:
             ([{"autoreset": "disabled"}, {"autoreset": "disabled", "message_size": 1}], "different lengths"),
         ],
     )
-    def test_bad_batches(self, batches: list[dict[str, Any]], message: str) -> None:
+    def test_invalid_batches_are_refused(self, batches: list[dict[str, Any]], message: str) -> None:
         made = [posse.batch("constant", 1, **settings) for settings in batches]
         layout = posse.ObservationLayout(posse.get_scenario("constant"))
         with pytest.raises(ValueError, match=message):

@@ -21,8 +21,12 @@ from posse_training.train.train import resume, train
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
 def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
-    found = default_settings(scenario, algorithm, preset="residual")
-    assert TrainSettings.from_dict(json.loads(json.dumps(found.to_dict()))) == found
+    for preset in ("nothing", "residual") if ALGORITHMS[algorithm].on_policy else ("nothing",):
+        found = default_settings(scenario, algorithm, preset=preset)
+        assert TrainSettings.from_dict(json.loads(json.dumps(found.to_dict()))) == found
+    if not ALGORITHMS[algorithm].on_policy:
+        with pytest.raises(SettingsError, match="goes with ppo or mappo"):
+            default_settings(scenario, algorithm, preset="residual")
 
 
 @pytest.mark.parametrize(
@@ -34,7 +38,7 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ({"learning_rate": float("nan")}, "learning_rate=nan"),
         ({"hidden": (0,)}, "hidden=.* is invalid: it must be whole numbers of at least 1"),
         ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
-        ({"safeguard": True, "advise": "ddcs-tuned"}, "safeguard=True goes with neither advise nor imitate"),
+        ({"safeguard": True, "advise": "ddcs-tuned"}, "safeguard=True goes with neither advise"),
         ({"overrides": [1]}, r"overrides=\[1\]"),
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
         ({"overrides": {"message_size": 3}}, "use the setting message_size"),

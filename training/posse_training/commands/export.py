@@ -81,8 +81,7 @@ def columns(policy: LearnedPolicy) -> dict[str, list[str]]:
     proposal.
     """
     encoding, network = policy.encoding, policy.network
-    proposed = policy.description()["correction"] == "velocity"
-    motion = ["ahead", "left"] if proposed or policy.safeguard else ["speed", "turn_rate"]
+    motion = ["ahead", "left"] if policy.adviser or policy.safeguard else ["speed", "turn_rate"]
     believed = network.inputs - encoding.size - MOTION if encoding.believes else 0
     output = "correction" if policy.adviser else "wanted_velocity" if policy.safeguard else "action"
     every = {

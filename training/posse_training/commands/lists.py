@@ -58,7 +58,7 @@ def policies(arguments: Sequence[str]) -> None:
     rows = [(name, text) for name, text in MEANINGS.items() if which.all or name not in ABLATIONS]
     for name in shipped():
         kind, _, scenario = name.partition("-")
-        where = "eight scenarios at once" if scenario == "generalist" else scenario
+        where = "two families and radio" if scenario == "generalist" else scenario
         learned = "a correction of ddcs-tuned, learned" if kind == "corrected" else "learned"
         rows.append((name, f"{learned} on {where}"))
     _show(("policy", "what it does"), rows)

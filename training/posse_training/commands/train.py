@@ -32,8 +32,8 @@ class _Arguments(TrainSettings):
     """Settings of a training, and how often and where it is made."""
 
     preset: Preset = "nothing"
-    """Default settings: learn from nothing, that is from random weights; or learn a correction of a scripted team,
-    where the scenario has such defaults and the algorithm is on policy."""
+    """Default settings: learn from nothing, that is from random weights; or, on policy, a correction of a scripted
+    team."""
     seed: Annotated[int, tyro.conf.Suppress] = 1
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(name="seed")] = (1,)
     """Seed of the worlds, the networks and the exploration; or several for as many runs, in turn, or with --ray at

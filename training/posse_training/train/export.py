@@ -50,7 +50,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
     )
     advising = make_advising(settings)
     adviser = None if advising is None else advising.adviser
-    return LearnedPolicy(network, encoding, card, adviser, settings.correction, settings.safeguard)
+    return LearnedPolicy(network, encoding, card, adviser, settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""The default settings of a training, by preset, scenario and algorithm: the files in ``posse_training/defaults``."""
+"""The default settings of a training, by preset, scenario and algorithm: ``defaults.toml`` beside this file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import tomllib
 from importlib import resources
 from typing import Any, Literal
 
+from posse_training.errors import SettingsError
 from posse_training.train.algorithms import algorithm_of
 from posse_training.train.settings import TrainSettings
 
@@ -17,33 +18,27 @@ def default_settings(
 ) -> TrainSettings:
     """Return the default settings of a scenario.
 
-    ``all.toml`` holds for every training, ``nothing.toml``, ``residual.toml`` and ``target.toml`` for a preset or a
-    target, and the file of a scenario for its corrections. In each, the table ``all`` holds for every algorithm,
-    ``on-policy`` and ``off-policy`` for those, and a table that is named after an algorithm for it alone.
-
     Args:
         scenario: A scenario's name, or several separated by commas.
         algorithm: One of the algorithms.
         side: What learns; a target learns from nothing, whatever the preset.
         preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn a correction of
-            a scripted team, on policy and where the scenario has a file.
+            a scripted team, on policy.
 
     Raises:
-        SettingsError: An unknown algorithm, or an invalid default.
+        SettingsError: An unknown algorithm, or a correction off policy.
     """
     on_policy = algorithm_of(algorithm).on_policy
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
-    folder = resources.files("posse_training") / "defaults"
-    own = folder / ("mixture.toml" if "," in scenario else f"{scenario}.toml")
+    learns: str = preset
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
-        files = [folder / "target.toml"]
-    elif preset == "residual" and on_policy and own.is_file():
-        files = [folder / "residual.toml", own]
-    else:
-        files = [folder / "nothing.toml"]
-    for file in (folder / "all.toml", *files):
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        for table in ("all", "on-policy" if on_policy else "off-policy", algorithm):
-            values.update(tables.get(table, {}))
+        learns = "target"
+    elif preset == "residual" and not on_policy:
+        raise SettingsError(f"preset='residual' goes with ppo or mappo, not {algorithm}: use the preset nothing")
+    file = resources.files("posse_training.train") / "defaults.toml"
+    defaults = tomllib.loads(file.read_text(encoding="utf-8"))
+    for name in ("every", learns):
+        for table in ("all", "on-policy" if on_policy else "off-policy", algorithm, scenario):
+            values.update(defaults[name].get(table, {}))
     return TrainSettings.from_dict(values)

@@ -137,9 +137,7 @@ class TrainSettings:
     """Rounds of play and fit; the copy acts in a growing share of the worlds."""
 
     advise: str | None = None
-    """Scripted policy whose proposals are network inputs, and which the output corrects."""
-    correction: Literal["motion", "velocity"] = "motion"
-    """The output corrects the adviser's action, or its wanted velocity before its safeguard."""
+    """Scripted policy: the network reads the velocity that it wants, and the output corrects it."""
 
     # Evaluation, checkpoints and logs
     evaluate_every: int = number(1_000_000, "", 1, 10**15)
@@ -265,8 +263,8 @@ def _check_together(s: TrainSettings) -> None:
         )
     if s.safeguard and (s.advise is not None or s.imitate is not None):
         raise SettingsError(
-            "safeguard=True goes with neither advise nor imitate, whose actions are not wanted velocities: "
-            "use --no-safeguard; a correction of the adviser's velocity is safeguarded by the adviser"
+            "safeguard=True goes with neither advise, whose own safeguard follows the correction, nor imitate, whose "
+            "actions are no wanted velocities: use --no-safeguard"
         )
     own, other = ("target", "team") if s.side == "target" else ("team", "target")
     if getattr(s, own) is not None:

@@ -95,7 +95,7 @@ def make_advising(settings: TrainSettings) -> Advising | None:
     """
     if settings.advise is None:
         return None
-    return Advising(load(settings.advise), settings.correction, believes=settings.encoding == "belief")
+    return Advising(load(settings.advise), believes=settings.encoding == "belief")
 
 
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
