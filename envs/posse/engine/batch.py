@@ -23,6 +23,7 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
+    Pass,
     Results,
     direct,
     draw_anew,
@@ -472,13 +473,12 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        tables, arrays, scratch = self._tables, self._arrays, self._scratch
-        threads = scratch.size
+        through = Pass(self._tables, self._arrays, actions, orders, results, self._scratch)
+        threads = len(self._scratch)
         if threads == 1:
-            over = self._kernel(tables, arrays, actions, results, orders, scratch, 0, 0, self.num_worlds)
+            over = self._kernel(through, 0, 0, self.num_worlds)
         else:
-            arguments = tables, arrays, actions, results, orders, scratch
-            over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
+            over = sum(over_worlds(self._kernel, (through,), self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)

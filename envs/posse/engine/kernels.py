@@ -70,6 +70,20 @@ class Results(NamedTuple):
     """(E,)."""
 
 
+class Pass(NamedTuple):
+    """What a pass over the worlds reads and writes."""
+
+    tables: Tables
+    worlds: WorldArrays
+    actions: FloatArray
+    """(E, rows, 2 + m); read by control steps only."""
+    orders: npt.NDArray[np.uint8]
+    """(E,) what each world does, see :func:`advance_worlds`."""
+    results: Results
+    scratch: Records
+    """(threads,) :data:`SCRATCH`."""
+
+
 @compiled
 def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Record) -> None:
     """Target sensors and radio of every tracker of world e."""
@@ -127,17 +141,7 @@ def fetch_all(array: npt.NDArray[Any]) -> None:
 
 
 @compiled
-def advance_worlds(
-    first: int,
-    count: int,
-    tables: Tables,
-    worlds: WorldArrays,
-    actions: FloatArray,
-    results: Results,
-    orders: npt.NDArray[np.uint8],
-    made: Generated,
-    scratch: Record,
-) -> int:
+def advance_worlds(first: int, count: int, through: Pass, made: Generated, scratch: Record) -> int:
     """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
@@ -150,13 +154,14 @@ def advance_worlds(
     ``count`` is at most TOGETHER. The scratch memory must be initialised by
     :func:`posse.rules.discs.lay_out_constants`.
     """
+    tables, worlds, actions, results = through.tables, through.worlds, through.actions, through.results
     c, over = tables.config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
             fetch_all(observations)  # written below, after the loop; without it 16,384 worlds take a third longer
-        order = orders[e]
+        order = through.orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
@@ -221,25 +226,14 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     made = generated_for(declarations)
 
     @kernel
-    def advance(
-        tables: Tables,
-        worlds: WorldArrays,
-        actions: FloatArray,
-        results: Results,
-        orders: npt.NDArray[np.uint8],
-        scratch: Records,
-        thread: int,
-        first: int,
-        end: int,
-    ) -> int:
-        s = scratch[nonnegative(thread)]
+    def advance(through: Pass, thread: int, first: int, end: int) -> int:
+        s = through.scratch[nonnegative(thread)]
         if s.prepared[0] == ZERO:
-            lay_out_constants(tables.config[0], tables.beams, s)
+            lay_out_constants(through.tables.config[0], through.tables.beams, s)
             s.prepared[0] = ONE
         over = 0
         for e in range(nonnegative(first), end, TOGETHER):
-            count = min(TOGETHER, end - e)
-            over += advance_worlds(e, count, tables, worlds, actions, results, orders, made, s)
+            over += advance_worlds(e, min(TOGETHER, end - e), through, made, s)
         return over
 
     return advance
