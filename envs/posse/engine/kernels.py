@@ -38,6 +38,9 @@ SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
 
 
+Orders = npt.NDArray[np.uint8]
+
+
 class Tables(NamedTuple):
     """Constants common to the worlds of a batch."""
 
@@ -70,6 +73,15 @@ class Results(NamedTuple):
     """(E,)."""
 
 
+class Fixed(NamedTuple):
+    """What a batch passes to its kernel every time."""
+
+    tables: Tables
+    worlds: WorldArrays
+    scratch: Records
+    """(threads,) :data:`SCRATCH`."""
+
+
 class Pass(NamedTuple):
     """What a pass over the worlds reads and writes."""
 
@@ -77,11 +89,9 @@ class Pass(NamedTuple):
     worlds: WorldArrays
     actions: FloatArray
     """(E, rows, 2 + m); read by control steps only."""
-    orders: npt.NDArray[np.uint8]
+    orders: Orders
     """(E,) what each world does, see :func:`advance_worlds`."""
     results: Results
-    scratch: Records
-    """(threads,) :data:`SCRATCH`."""
 
 
 @compiled
@@ -226,10 +236,13 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     made = generated_for(declarations)
 
     @kernel
-    def advance(through: Pass, thread: int, first: int, end: int) -> int:
-        s = through.scratch[nonnegative(thread)]
+    def advance(
+        fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
+    ) -> int:
+        through = Pass(fixed.tables, fixed.worlds, actions, orders, results)
+        s = fixed.scratch[nonnegative(thread)]
         if s.prepared[0] == ZERO:
-            lay_out_constants(through.tables.config[0], through.tables.beams, s)
+            lay_out_constants(fixed.tables.config[0], fixed.tables.beams, s)
             s.prepared[0] = ONE
         over = 0
         for e in range(nonnegative(first), end, TOGETHER):
