@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import reprlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -45,9 +45,7 @@ _RECYCLED_FROM: Final = 1 << 14
 """Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(
-    ("_declared", "_own_terms", "_dispatcher", "_kernel", "_orders", "_fixed", "_returned", "_infos")
-)
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_returned", "_infos"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -175,8 +173,7 @@ class Batch:
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = declarations_for(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
-        self._dispatcher: Callable[..., int] = kernel_of(self._declared)
-        self._kernel: Callable[..., int] = direct(self._dispatcher)
+        self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
         tables = tables_of(self.scenario, self._declared.reward_terms)
@@ -399,7 +396,7 @@ class Batch:
         results = self._new_results()
         actions = np.zeros(self.action_shape, np.float32)  # not read
         self._advance(actions, results, np.where(chosen, order, LOOK).astype(np.uint8))
-        self._kernel = direct(self._dispatcher)  # now compiled
+        self._kernel = direct(self._kernel)  # now compiled
         if not self._started:
             self.layout.check_added(results.observations)
         return results.observations

@@ -249,18 +249,16 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
             over += advance_worlds(e, min(TOGETHER, end - e), through, made, s)
         return over
 
-    return advance
+    return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn
 
 
 def direct(function: Callable[..., int]) -> Callable[..., int]:
     """Return the machine code of a kernel, which does not check the types of its arguments.
 
     numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
-    arguments of the types of the kernel's first call. A kernel that has not been called yet, or with several types, is
-    returned unchanged. Uncompiled kernels do not warn of overflow, since compiled code does not.
+    arguments of the types of the kernel's first call. One that has not been called yet, or with several types, or
+    that is no dispatcher, is returned unchanged.
     """
-    if UNCOMPILED:
-        return np.errstate(over="ignore", under="ignore")(function)
     forms = list(getattr(function, "overloads", {}).values())
     return forms[0].entry_point if len(forms) == 1 else function
 
