@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import reprlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -23,6 +23,7 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
+    Fixed,
     Results,
     direct,
     draw_anew,
@@ -44,9 +45,7 @@ _RECYCLED_FROM: Final = 1 << 14
 """Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(
-    ("_declared", "_own_terms", "_tables", "_dispatcher", "_kernel", "_orders", "_scratch", "_returned", "_infos")
-)
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_returned", "_infos"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -124,6 +123,7 @@ class Batch:
         clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
 
     Attributes:
+        arrays: The state of the worlds; writing to it changes them.
         layout: Position of each field in an observation.
         term_names: Names of the reward terms, in the order in which they are reported.
         observation_shape: (E, rows, F); rows = N, plus one if the target is an agent.
@@ -159,7 +159,7 @@ class Batch:
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
         try:
-            self._arrays = WorldArrays.allocate(scenario, self.num_worlds)
+            self.arrays = WorldArrays.allocate(scenario, self.num_worlds)
         except (MemoryError, ValueError, OverflowError):
             each = sum(array.nbytes for array in WorldArrays.allocate(scenario, 1))
             raise ScenarioError(
@@ -173,12 +173,11 @@ class Batch:
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = declarations_for(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
-        self._tables = tables_of(self.scenario, self._declared.reward_terms)
-        self._dispatcher: Callable[..., int] = kernel_of(self._declared)
-        self._kernel: Callable[..., int] = direct(self._dispatcher)
+        self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        self._scratch = new_scratch(SCRATCH, threads)
+        tables = tables_of(self.scenario, self._declared.reward_terms)
+        self._fixed = Fixed(tables, self.arrays, new_scratch(SCRATCH, threads))
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
@@ -200,7 +199,7 @@ class Batch:
         Names are ``<array>_<field>``, e.g. ``"tracker_x"`` (E, N) or ``"world_step"`` (E,);
         :mod:`posse.rules.state` documents every field.
         """
-        names = self._arrays.by_name()
+        names = self.arrays.by_name()
         for view in names.values():
             view.flags.writeable = False
         return names
@@ -208,36 +207,31 @@ class Batch:
     @property
     def worlds(self) -> Records:
         """The worlds' records, (E,) :func:`posse.rules.state.world_record`."""
-        return self._arrays.world
-
-    @property
-    def arrays(self) -> WorldArrays:
-        """The arrays themselves, not copies: writing to them changes the worlds."""
-        return self._arrays
+        return self.arrays.world
 
     @property
     def score(self) -> FloatArray:
         """(E,) the score of the current step; 0 at the start."""
-        return np.array(self._arrays.world["score"])
+        return np.array(self.arrays.world["score"])
 
     @property
     def terminated(self) -> BoolArray:
         """(E,) whether the last step or reset left the world's episode terminated."""
-        return np.asarray(self._arrays.world["terminated"] != 0)
+        return np.asarray(self.arrays.world["terminated"] != 0)
 
     @property
     def truncated(self) -> BoolArray:
         """(E,) whether the last step or reset left the world's episode truncated."""
-        return np.asarray(self._arrays.world["over"] != 0) & ~self.terminated
+        return np.asarray(self.arrays.world["over"] != 0) & ~self.terminated
 
     @property
     def working(self) -> BoolArray:
         """(E, N) whether each tracker works."""
-        return np.asarray(self._arrays.tracker["broken_at"] == NEVER)
+        return np.asarray(self.arrays.tracker["broken_at"] == NEVER)
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
         """Return the metrics of the current episodes by name, (E,) each."""
-        return {each.name: each.of(self.scenario, self._arrays.world) for each in self._declared.metrics}
+        return {each.name: each.of(self.scenario, self.arrays.world) for each in self._declared.metrics}
 
     def save(self) -> Snapshot:
         """Return the current state of the worlds, for :meth:`restore`.
@@ -246,7 +240,7 @@ class Batch:
             ResetNeeded: Before the first :meth:`reset`.
         """
         self.check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy())
+        return Snapshot(self.scenario, self.arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -258,7 +252,7 @@ class Batch:
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
-        self._arrays.write(snapshot.arrays)
+        self.arrays.write(snapshot.arrays)
         self._started = True
         return self.observe()
 
@@ -300,11 +294,11 @@ class Batch:
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
-        for mine, theirs in zip(self._arrays, into._arrays, strict=True):
+        for mine, theirs in zip(self.arrays, into.arrays, strict=True):
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
                 theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
-        draw_anew(self._tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        draw_anew(self._fixed.tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
 
@@ -340,7 +334,7 @@ class Batch:
         new_seed = self.seed if seed is None else check_count("seed", seed, 0)
         chosen = self._chosen(given.get("reset_mask"))
         poses = poses_of(given, self.scenario, self.num_worlds)
-        before, over, world = self._arrays.copy(), self._over, self._arrays.world
+        before, over, world = self.arrays.copy(), self._over, self.arrays.world
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"] = SPLITS.index(self.split)
@@ -355,7 +349,7 @@ class Batch:
                 self._place(poses, chosen)
                 observations = self._start(chosen, START_FROM_POSES)
         except BaseException:
-            self._arrays.write(before)
+            self.arrays.write(before)
             self._over = over
             raise
         self.seed, self._started = new_seed, True
@@ -377,13 +371,13 @@ class Batch:
 
     def _place(self, poses: Mapping[str, npt.NDArray[np.float64]], chosen: BoolArray) -> None:
         """Set poses in the chosen worlds, and check them by the rules of a drawn start."""
-        arrays = self._arrays
+        arrays = self.arrays
         for name, pose in poses.items():
             records = arrays.tracker if name == "tracker_pose" else arrays.world
             x, y, heading = np.moveaxis(pose[chosen], -1, 0)
             records["x"][chosen], records["y"][chosen] = x, y
             records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
-        config, n = self._tables.config, self.scenario.num_trackers
+        config, n = self._fixed.tables.config, self.scenario.num_trackers
         e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
         if e < 0:
             return
@@ -402,7 +396,7 @@ class Batch:
         results = self._new_results()
         actions = np.zeros(self.action_shape, np.float32)  # not read
         self._advance(actions, results, np.where(chosen, order, LOOK).astype(np.uint8))
-        self._kernel = direct(self._dispatcher)  # now compiled
+        self._kernel = direct(self._kernel)  # now compiled
         if not self._started:
             self.layout.check_added(results.observations)
         return results.observations
@@ -430,7 +424,8 @@ class Batch:
                 changed.
         """
         self.check_running()
-        actions, results = self.check_actions(actions), self._new_results()
+        actions = in_box(as_float32("the array of actions", actions, self.action_shape), self.clip_actions)
+        results = self._new_results()
         begun = self._over > 0 and self.autoreset == "next_step"
         over = self._advance(actions, results) > 0
         observations, rewards, terms, scores, terminated, truncated = results
@@ -442,11 +437,11 @@ class Batch:
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
-                self._arrays.world["episode"][ended] += 1
+                self.arrays.world["episode"][ended] += 1
                 observations, begun = self._start(ended, START), True
         if begun:
             try:
-                check_drawn(self.scenario, self._arrays.world, self._arrays.world["step"] == 0)
+                check_drawn(self.scenario, self.arrays.world, self.arrays.world["step"] == 0)
             except ScenarioError:
                 self._started = False  # only a reset helps
                 raise
@@ -461,10 +456,6 @@ class Batch:
             infos["working"] = self.working
         return infos
 
-    def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
-        return in_box(as_float32("the array of actions", actions, self.action_shape), self.clip_actions)
-
     def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
         """Advance every world by valid actions, or execute its order; return how many episodes are over.
 
@@ -472,12 +463,12 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        tables, arrays, scratch = self._tables, self._arrays, self._scratch
-        threads = scratch.size
-        if threads == 1:
-            over = self._kernel(tables, arrays, actions, results, orders, scratch, 0, 0, self.num_worlds)
+        fixed = self._fixed
+        threads = len(fixed.scratch)
+        if threads == 1:  # for one world, the other way takes a tenth longer
+            over = self._kernel(fixed, actions, orders, results, 0, 0, self.num_worlds)
         else:
-            arguments = tables, arrays, actions, results, orders, scratch
+            arguments = fixed, actions, orders, results
             over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
@@ -502,10 +493,9 @@ class Batch:
 
     def check_running(self) -> None:
         """Raise ResetNeeded if a step is not possible now."""
-        if not self._started:
-            self.check_started("step")
+        self.check_started("step")
         if self._over and self.autoreset == "disabled":
-            over = np.flatnonzero(self._arrays.world["over"])
+            over = np.flatnonzero(self.arrays.world["over"])
             more = f" and {len(over) - 1} more" if len(over) > 1 else ""
             raise ResetNeeded(
                 f"step after the end of the episode of world {over[0]}{more}: call reset() first, "

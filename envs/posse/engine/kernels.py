@@ -38,6 +38,9 @@ SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
 
 
+Orders = npt.NDArray[np.uint8]
+
+
 class Tables(NamedTuple):
     """Constants common to the worlds of a batch."""
 
@@ -68,6 +71,27 @@ class Results(NamedTuple):
     """(E,)."""
     truncated: BoolArray
     """(E,)."""
+
+
+class Fixed(NamedTuple):
+    """What a batch passes to its kernel every time."""
+
+    tables: Tables
+    worlds: WorldArrays
+    scratch: Records
+    """(threads,) :data:`SCRATCH`."""
+
+
+class Pass(NamedTuple):
+    """What a pass over the worlds reads and writes."""
+
+    tables: Tables
+    worlds: WorldArrays
+    actions: FloatArray
+    """(E, rows, 2 + m); read by control steps only."""
+    orders: Orders
+    """(E,) what each world does, see :func:`advance_worlds`."""
+    results: Results
 
 
 @compiled
@@ -127,17 +151,7 @@ def fetch_all(array: npt.NDArray[Any]) -> None:
 
 
 @compiled
-def advance_worlds(
-    first: int,
-    count: int,
-    tables: Tables,
-    worlds: WorldArrays,
-    actions: FloatArray,
-    results: Results,
-    orders: npt.NDArray[np.uint8],
-    made: Generated,
-    scratch: Record,
-) -> int:
+def advance_worlds(first: int, count: int, through: Pass, made: Generated, scratch: Record) -> int:
     """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
@@ -150,13 +164,14 @@ def advance_worlds(
     ``count`` is at most TOGETHER. The scratch memory must be initialised by
     :func:`posse.rules.discs.lay_out_constants`.
     """
+    tables, worlds, actions, results = through.tables, through.worlds, through.actions, through.results
     c, over = tables.config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
             fetch_all(observations)  # written below, after the loop; without it 16,384 worlds take a third longer
-        order = orders[e]
+        order = through.orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
@@ -222,38 +237,28 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
 
     @kernel
     def advance(
-        tables: Tables,
-        worlds: WorldArrays,
-        actions: FloatArray,
-        results: Results,
-        orders: npt.NDArray[np.uint8],
-        scratch: Records,
-        thread: int,
-        first: int,
-        end: int,
+        fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
     ) -> int:
-        s = scratch[nonnegative(thread)]
+        through = Pass(fixed.tables, fixed.worlds, actions, orders, results)
+        s = fixed.scratch[nonnegative(thread)]
         if s.prepared[0] == ZERO:
-            lay_out_constants(tables.config[0], tables.beams, s)
+            lay_out_constants(fixed.tables.config[0], fixed.tables.beams, s)
             s.prepared[0] = ONE
         over = 0
         for e in range(nonnegative(first), end, TOGETHER):
-            count = min(TOGETHER, end - e)
-            over += advance_worlds(e, count, tables, worlds, actions, results, orders, made, s)
+            over += advance_worlds(e, min(TOGETHER, end - e), through, made, s)
         return over
 
-    return advance
+    return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn
 
 
 def direct(function: Callable[..., int]) -> Callable[..., int]:
     """Return the machine code of a kernel, which does not check the types of its arguments.
 
     numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
-    arguments of the types of the kernel's first call. A kernel that has not been called yet, or with several types, is
-    returned unchanged. Uncompiled kernels do not warn of overflow, since compiled code does not.
+    arguments of the types of the kernel's first call. One that has not been called yet, or with several types, or
+    that is no dispatcher, is returned unchanged.
     """
-    if UNCOMPILED:
-        return np.errstate(over="ignore", under="ignore")(function)
     forms = list(getattr(function, "overloads", {}).values())
     return forms[0].entry_point if len(forms) == 1 else function
 

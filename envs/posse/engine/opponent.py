@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from posse.scenarios.family import scenario_or_family, shares
 from posse.signals.layout import ObservationLayout
 
 
-@runtime_checkable
 class TargetPolicy(Protocol):
     """Moves the target of every world; it observes the trackers without error.
 

@@ -206,24 +206,22 @@ def lowest_bit(number: int) -> int:
     return (whole & -whole).bit_length() - 1
 
 
-def _emit_transpose(builder: Any, *rows: Any) -> Any:
+def _emit_transpose(builder: Any, block: Any) -> Any:
     """Swap blocks of 1, 2x2 and 4x4 numbers across the diagonal in three rounds."""
+    rows = cgutils.unpack_tuple(builder, block, WIDTH)
     for size in (1, 2, 4):
         upper = [k if k & size == 0 else k - size + WIDTH for k in range(WIDTH)]
         lower = [k + size if k & size == 0 else k + WIDTH for k in range(WIDTH)]
-        rows = tuple(
+        rows = [
             _shuffle(builder, rows[k & ~size], rows[k | size], upper if k & size == 0 else lower) for k in range(WIDTH)
-        )
+        ]
     return cgutils.pack_array(builder, rows, _FLOATS)
 
 
-@_emits(_emit_transpose, types.UniTuple(_LANES, WIDTH), *(_LANES,) * WIDTH)
-def transpose(
-    a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes
-) -> tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]:
+@_emits(_emit_transpose, types.UniTuple(_LANES, WIDTH), types.UniTuple(_LANES, WIDTH))
+def transpose(rows: tuple[Lanes, ...]) -> tuple[Lanes, ...]:
     """Return the transposed 8 x 8 matrix: the first lanes of all, the second lanes of all, ..."""
-    rows = np.array([np.broadcast_to(v, WIDTH) for v in (a, b, c, d, e, f, g, h)], np.float32)
-    return tuple(rows.T)
+    return tuple(np.array([np.broadcast_to(row, WIDTH) for row in rows], np.float32).T)
 
 
 def _accesses(emit: Callable[..., Any], kind: Any, result: Any, *more: Any) -> Callable[[F], F]:

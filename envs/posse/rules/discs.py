@@ -89,7 +89,7 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
     block begins, such as :data:`posse.rules.state.POSE`, whose named tuple is made of the result.
     """
     last = count - 1
-    return transpose(
+    rows = (
         load_fields(records[nonnegative(min(first, last))], offset),
         load_fields(records[nonnegative(min(first + 1, last))], offset),
         load_fields(records[nonnegative(min(first + 2, last))], offset),
@@ -99,13 +99,14 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
         load_fields(records[nonnegative(min(first + 6, last))], offset),
         load_fields(records[nonnegative(min(first + 7, last))], offset),
     )
+    return transpose(rows)
 
 
 @compiled
 def store_rows(block: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
     """Inverse of :func:`columns`: write eight numbers per record."""
     a, b, c, d, e, f, g, h = block
-    a, b, c, d, e, f, g, h = transpose(a, b, c, d, e, f, g, h)
+    a, b, c, d, e, f, g, h = transpose((a, b, c, d, e, f, g, h))
     store(row, at, a)
     store(row, at + WIDTH, b)
     store(row, at + 2 * WIDTH, c)

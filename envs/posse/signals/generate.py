@@ -203,7 +203,7 @@ class _Module:
             # As soon as there are eight, so that few have to be kept at a time.
             while blocks and len(columns) >= blocks[0] + WIDTH:
                 first = blocks.pop(0)
-                yield f"write_block({', '.join(columns[first : first + WIDTH])}, {first}, rows)"
+                yield f"write_block(({', '.join(columns[first : first + WIDTH])}), {first}, rows)"
         yield from (f"write_column({columns[q]}, {q}, s, rows)" for q in single)
 
     def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:

@@ -124,7 +124,7 @@ def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int
 @compiled
 def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View, p: int, now: bool, s: Record) -> Mate:
     """Return the mate in a place of each observer; in an empty place, number -1 and the data of the first tracker."""
-    fields = transpose(
+    rows = (
         _fields_of(worlds, observers, p, now, 0, s),
         _fields_of(worlds, observers, p, now, 1, s),
         _fields_of(worlds, observers, p, now, 2, s),
@@ -134,6 +134,7 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
         _fields_of(worlds, observers, p, now, 6, s),
         _fields_of(worlds, observers, p, now, 7, s),
     )
+    fields = transpose(rows)
     if now:
         t, age = Pose(*fields), eight(ZERO)
         x, y, cos, sin, speed, turn_rate = t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate
@@ -188,11 +189,9 @@ def _write_messages(
 
 
 @compiled
-def write_block(
-    a: Lanes, b: Lanes, c: Lanes, d: Lanes, f: Lanes, g: Lanes, h: Lanes, j: Lanes, first: int, rows: Rows
-) -> None:
+def write_block(columns: tuple[Lanes, ...], first: int, rows: Rows) -> None:
     """Write eight columns, the first of them column ``first``."""
-    a, b, c, d, f, g, h, j = transpose(a, b, c, d, f, g, h, j)
+    a, b, c, d, f, g, h, j = transpose(columns)
     # Not in a loop: which of a tuple is meant would be looked up at run time.
     _write_row(a, 0, first, rows)
     _write_row(b, 1, first, rows)
