@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import tyro
 from rich.console import Console
 
@@ -28,7 +27,7 @@ from posse_training.train.train import train
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 COLUMNS: Final = (
     *("algorithm", "safeguard", "scenario", "version", "training_seed", "steps", "worlds", "seed"),
-    *("safe_score", "low", "high", "score", "contact_free", "area", "steps_per_second", "commit"),
+    *("safe_score", "low", "high", "score", "contact_free", "steps_per_second", "commit"),
 )
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 NAMES: Final = ("algorithm", "safeguard", "scenario", "training_seed")
@@ -64,15 +63,12 @@ def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, see
 
 
 def row_of(run: TrainSettings, worlds: int) -> dict[str, Any]:
-    """Return the row of a finished run: its last policy on test worlds, and the area under its curve."""
+    """Return the row of a finished run: its last policy on test worlds."""
     policy = load(str(run.run_folder / LAST))
     card: dict[str, Any] = policy.card  # type: ignore[attr-defined]
     results = evaluate(policy, run.scenario, worlds, TEST_SEED, split="test", progress=False)
     safe, last = mean(results["safe_score"]), card["curve"][-1]
-    steps = [0.0, *(point["steps"] for point in card["curve"])]
-    scores = [0.0, *(point["safe_score"] for point in card["curve"])]
-    area = float(np.trapezoid(scores, steps) / steps[-1])
-    numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean(), area)
+    numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean())
     values = (
         *(
             run.algorithm,

@@ -154,7 +154,7 @@ def _named(figures: dict[str, Any]) -> dict[str, float]:
         **{f"{r['worlds']:,} worlds, {r['threads']} threads": r["agent_steps"][0] for r in figures["batches"]},
         **{f"{name}, one world": rate[0] for name, rate in figures["one_world"].items()},
         **{f"first step {name}, s": each for name, each in figures.get("first_step_seconds", {}).items()},
-        "cores used by other processes": max(figures["other_work"], 0.01),
+        "load average": max(figures["machine"]["load_average"], 0.01),
     }
 
 
@@ -172,15 +172,12 @@ def main() -> None:
     if settings.against is not None:
         compare(settings, settings.against)
         return
-    others, own = machine.OtherWork(), time.process_time()
     figures: dict[str, Any] = {"machine": machine.describe()}
     figures["batches"], figures["one_world"] = batches(settings), one_world(settings)
-    busy = others.cores(time.process_time() - own)
-    print(f"cores used by other processes meanwhile: {busy:.2f}")
     if settings.cold:
         figures["first_step_seconds"] = first_step()
     settings.out.parent.mkdir(parents=True, exist_ok=True)
-    settings.out.write_text(json.dumps({**figures, "other_work": busy}, indent=2) + "\n", encoding="utf-8")
+    settings.out.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
