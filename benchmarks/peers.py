@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import tyro
-from machine import describe
+from speed import describe
 
 RUNNERS: Final = Path(__file__).parent / "peers"
 TABLE: Final = Path(__file__).parent / "peers.csv"

@@ -7,8 +7,10 @@ checkout instead.
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import os
+import platform
 import statistics
 import subprocess
 import sys
@@ -21,11 +23,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium as gym
-import machine
 import numpy as np
 import tyro
 
 import posse
+from posse_training.provenance import commit
 
 FIRST_STEP = (
     "import gymnasium, posse; "
@@ -166,13 +168,36 @@ def _shown(rate: list[float]) -> str:
     return "{:,.0f} [{:,.0f}, {:,.0f}]".format(*rate)
 
 
+def describe() -> dict[str, Any]:
+    """Return machine, date and commit."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "date": dt.date.today().isoformat(),
+        "commit": commit(),
+        "load_average": os.getloadavg()[0],
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
 def main() -> None:
     """Measure, print and write the figures."""
     settings = tyro.cli(Settings, description=__doc__)
     if settings.against is not None:
         compare(settings, settings.against)
         return
-    figures: dict[str, Any] = {"machine": machine.describe()}
+    figures: dict[str, Any] = {"machine": describe()}
     figures["batches"], figures["one_world"] = batches(settings), one_world(settings)
     if settings.cold:
         figures["first_step_seconds"] = first_step()

@@ -5,12 +5,14 @@ A line ``{{ name arguments }}`` of a page is replaced by what the part of that n
 
 from __future__ import annotations
 
+import html
 import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.pages import Page
@@ -19,7 +21,6 @@ from mkdocs.utils import get_relative_url
 import declared_tables
 import replays
 import standings
-from equations import typeset
 
 ROOT: Final = Path(__file__).parents[2]
 
@@ -92,3 +93,22 @@ def _made(found: re.Match[str]) -> str:
     if name not in PARTS:
         raise PluginError(f"unknown part {name!r} of a page; parts are: {', '.join(PARTS)}")
     return PARTS[name](*arguments)
+
+
+_FUNCTION: Final = re.compile(r"(\\(?:sin|cos))(?![a-z(])")
+_MARKED: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</(?:span|div)>', re.DOTALL)
+
+
+def typeset(page: str) -> str:
+    """Replace the equations that pymdownx.arithmatex has marked in a page by MathML."""
+    return _MARKED.sub(_mathml, page)
+
+
+def _mathml(marked: re.Match[str]) -> str:
+    display = marked[1] == "div"
+    tex = html.unescape(marked[2]).strip()
+    spaced = _FUNCTION.sub(r"\1\\,", tex)  # the converter sets cos x as cosx
+    mathml = convert(spaced, display="block" if display else "inline")
+    # The source stays readable for whoever copies it, and for screen readers.
+    mathml = mathml.replace("<math ", f'<math alttext="{html.escape(tex, quote=True)}" ', 1)
+    return f'<div class="equation">{mathml}</div>' if display else mathml

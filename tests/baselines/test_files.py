@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.support.disk import largest_file
 
 from posse_baselines.files import read_json, remove_unfinished, replacing, write_atomically
 
@@ -78,3 +78,16 @@ def test_json_that_cannot_be_read(tmp_path: Path, text: str) -> None:
     (tmp_path / "file.json").write_text(text)
     with pytest.raises(ValueError, match=r"nested too deeply|Expecting|digits"):
         read_json(tmp_path / "file.json")
+
+
+@contextlib.contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """Let no file grow beyond a size, in bytes."""
+    import resource  # POSIX only
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)

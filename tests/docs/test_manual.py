@@ -14,7 +14,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from tests.support.html import Tags
+from tests.support.browser import Tags
 from tests.support.pages import FENCE, PAGES, ROOT
 
 import posse

@@ -1,16 +1,21 @@
-"""``posse watch`` and ``posse play`` at the keys of a window without a screen."""
+"""``posse demo``, and ``posse watch`` and ``posse play`` at the keys of a window without a screen."""
 
 from __future__ import annotations
 
+import re
 import webbrowser
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pygame
 import pytest
+from PIL import Image
+from tests.support.process import printed
 
 from posse.rendering.canvas import Window
+from posse_training import demo
 from posse_training.cli import main
+from posse_training.evaluation import evaluate
 from posse_training.replay import read_replay
 
 At = Callable[[Mapping[int, str]], list[str]]
@@ -103,3 +108,26 @@ def test_the_arrows_drive_a_robot_and_the_last_round_is_recorded(
     speed, turn = player.columns["action"].values[:, row, :2].astype(float)[:6].T
     assert turn.tolist() == pytest.approx([0, 0, 1, -1, 0, 0], abs=1e-3)
     assert speed.tolist() == pytest.approx([1, 1, 0.8, 0.8, 0.8, 0.8], abs=1e-3)
+
+
+def test_the_demo_prints_a_line_for_each_team_then_the_replay_and_the_film(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    teams = {"script": "ddcs-tuned", "learned": "learned-smart", "planner": "pursuit"}
+    monkeypatch.setattr(demo, "TEAMS", teams)
+    assert main(["demo", "--episodes", "10", "--seconds", "0.5", "--out", "shown"]) == 0
+    lines = capsys.readouterr().out.strip().splitlines()
+    for (kind, name), line, worlds in zip(teams.items(), lines, (10, 10, 2), strict=False):
+        held = evaluate(name, "smart", worlds, 7, progress=False)["safe_score"].mean()
+        assert re.fullmatch(rf"{kind} +{name} +held {100 * held:.0f} ± \d+ % of its slots in {worlds} worlds", line)
+    assert lines[4].startswith("replay: shown/replay.html")
+    assert lines[5] == "film:   shown/smart.gif"
+    assert [player.name for player in read_replay("shown/replay.html").players] == ["ddcs-tuned", "learned-smart"]
+    with Image.open("shown/smart.gif") as film:
+        assert film.size == (800, 525)
+
+
+def test_the_demo_needs_no_torch() -> None:
+    code = "import sys, posse_training.demo; print('torch' in sys.modules)"
+    assert printed("-c", code).strip() == "False"

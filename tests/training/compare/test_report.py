@@ -7,14 +7,13 @@ import re
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.support.html import Tags
+from tests.support.browser import Tags
 from tests.support.learned import any_policy
 
 import posse
 from posse_training.compare import figures
 from posse_training.compare.compare import Comparison, Settings, compare
-from posse_training.compare.contenders import Contender
-from posse_training.compare.plays import Plays
+from posse_training.compare.contenders import Contender, Plays
 from posse_training.compare.report import extremes
 from posse_training.evaluation.results import Results
 from posse_training.replay import read_replay

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.html import Tags
+from tests.support.browser import Tags
 from tests.support.replays import ATTACK, hostile, short
 
 from posse_training.cli import main

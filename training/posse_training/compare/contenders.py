@@ -7,10 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
+from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
 from posse_training.errors import PlayError, TimeLimitError
 from posse_training.evaluation.evaluation import played_errors
+from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
 
 LONGEST_LABEL: Final = 100
@@ -92,3 +97,26 @@ def _check_label(label: str) -> None:
             f"the label {label[:60]!r}... ({len(label):,} characters) must have at most "
             f"{LONGEST_LABEL} printable characters: give it another one, LABEL=..."
         )
+
+
+@dataclass(frozen=True)
+class Plays:
+    """The results of a contender in a number of worlds, one for each training seed."""
+
+    label: str
+    results: tuple[Results, ...]
+
+    @property
+    def scenario(self) -> Scenario | Family:
+        """The scenario or family."""
+        return self.results[0].scenario
+
+    def __getitem__(self, metric: str) -> npt.NDArray[np.float64]:
+        """Return a metric, (S, W): training seeds by worlds."""
+        return np.stack([result[metric] for result in self.results])
+
+    def paired(self, other: Plays) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return the safe scores of both, (S, W) each, in the worlds that both played."""
+        mine, theirs = self["safe_score"], other["safe_score"]
+        both = min(mine.shape[1], theirs.shape[1])
+        return mine[:, :both], theirs[:, :both]

@@ -13,8 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posse import Scenario
-from posse_training.compare.contenders import Contender
-from posse_training.compare.plays import Plays
+from posse_training.compare.contenders import Contender, Plays
 from posse_training.evaluation.statistics import over_seeds, share
 from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain, save
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from posse_training.compare.plays import Plays
+from posse_training.compare.contenders import Plays
 from posse_training.evaluation.results import Results
 
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError
-from posse_training.compare.contenders import Contender, check_code
-from posse_training.compare.plays import Plays
+from posse_training.compare.contenders import Contender, Plays, check_code
 from posse_training.errors import PlayError, TimeLimitError, describe
 from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
 from posse_training.evaluation.results import Results

@@ -10,8 +10,8 @@ from typing import Any
 
 import jinja2
 
+from posse_training.compare.contenders import Plays
 from posse_training.compare.figures import CAPTIONS
-from posse_training.compare.plays import Plays
 from posse_training.compare.table import COLUMNS, Row, cell, ranked
 from posse_training.style import PLANNER
 

@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from posse_training.compare.plays import Plays
+from posse_training.compare.contenders import Plays
 from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
 
 Row = dict[str, Any]
