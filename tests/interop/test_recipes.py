@@ -12,8 +12,7 @@ from tests.support.process import printed
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = dict.fromkeys(
-    ("benchmarl_mappo", "benchmarl_qmix", "onnx_policy", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_both"),
-    "recipes",
+    ("benchmarl_smart", "onnx_policy", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_both"), "recipes"
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
 LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", "torchrl_batch", "torchrl_gym"}

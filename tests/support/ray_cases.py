@@ -16,7 +16,7 @@ import ray
 from numpy.testing import assert_equal
 from ray.cluster_utils import Cluster
 from safetensors.numpy import load_file
-from tests.support.ray_policies import Watched
+from tests.support.bad_policies import Watched
 
 from posse_baselines import load
 from posse_training import Results, evaluate
@@ -76,7 +76,7 @@ def test_a_killed_driver_resumes(nodes: Cluster, local: Results, folder: Path) -
     """The shard that waits is lost with its driver; those that were done are not played again."""
     code = (
         "from pathlib import Path\nfrom posse_training import evaluate\n"
-        "from tests.support.ray_policies import Watched\n"
+        "from tests.support.bad_policies import Watched\n"
         f"policy = Watched(Path({str(folder)!r}), 'wait')\n"
         f"evaluate(policy, 'smart', {EPISODES}, **{ {**THERE, 'ray': nodes.address}!r})\n"
     )
@@ -94,7 +94,7 @@ def test_a_killed_driver_resumes(nodes: Cluster, local: Results, folder: Path) -
 
 
 def test_a_policy_that_fails_or_kills_its_workers_is_named(nodes: Cluster, folder: Path) -> None:
-    with pytest.raises(PlayError, match=r"^ValueError: no idea \(.*ray_policies.py, line"):
+    with pytest.raises(PlayError, match=r"^ValueError: no idea \(.*bad_policies.py, line"):
         evaluate(Watched(folder, "fail"), "smart", EPISODES, **THERE)
     with pytest.raises(PlayError, match="4 workers died with it"):
         evaluate(Watched(folder, "die always"), "smart", 1, **THERE)

@@ -20,9 +20,8 @@ from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import PolicyError, load_target
 from posse_baselines.fields import number
 from posse_training.compare.contenders import Contender, Plays, read_contenders
-from posse_training.compare.marl_eval import write_marl_eval
 from posse_training.compare.playing import Game, Key, Played, play, played_on_ray, replay
-from posse_training.compare.table import Row, row_of, table
+from posse_training.compare.table import Row, row_of, table, write_marl_eval
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import progress_bar

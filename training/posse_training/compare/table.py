@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from posse_training.compare.contenders import Plays
+from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
 
 Row = dict[str, Any]
@@ -94,3 +97,21 @@ def cell(name: str, value: Estimate | float | None) -> str:
             return f"{100 * value.value:.1f} %"
         return f"{value.value:.3f}\n[{value.low:.3f}, {value.high:.3f}]"
     return "" if value is None else f"{value:.2f}"
+
+
+def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
+    """Write everything that was played in the JSON layout that marl-eval reads, and from it rliable.
+
+    The environment is posse, a task a scenario, an algorithm a policy, a run one of its training seeds, and each metric a
+    list with one value for each world. Times that some episodes lack are left out, since JSON has no nan.
+    """
+    tasks: dict[str, dict[str, Any]] = {}
+    for (scenario, policy), found in plays.items():
+        tasks.setdefault(scenario, {})[policy] = {f"seed_{k}": _run(results) for k, results in enumerate(found.results)}
+    text = json.dumps({"posse": tasks}, indent=2, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _run(results: Results) -> dict[str, Any]:
+    metrics = {name: column.tolist() for name, column in results.columns.items() if np.isfinite(column).all()}
+    return {"step_0": {"step_count": 0, **metrics}, "absolute_metrics": metrics}
