@@ -102,8 +102,8 @@ def cell(name: str, value: Estimate | float | None) -> str:
 def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
     """Write everything that was played in the JSON layout that marl-eval reads, and from it rliable.
 
-    The environment is posse, a task a scenario, an algorithm a policy, a run one of its training seeds, and each metric a
-    list with one value for each world. Times that some episodes lack are left out, since JSON has no nan.
+    The environment is posse, a task a scenario, an algorithm a policy, a run one of its training seeds, and each metric
+    a list with one value for each world. Times that some episodes lack are left out, since JSON has no nan.
     """
     tasks: dict[str, dict[str, Any]] = {}
     for (scenario, policy), found in plays.items():
