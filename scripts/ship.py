@@ -220,21 +220,15 @@ def _settings_of(scenario: Scenario) -> dict[str, Any]:
 
 
 def command_of(settings: TrainSettings) -> str:
-    """Return the command that trains with these settings, in the default folder.
-
-    It also states the values of the scenario's own defaults: these are often recorded only after
-    the training that found them, so the commit of the training may lack them.
-    """
-    which, side = (settings.scenario, settings.algorithm), settings.side
-    default = default_settings(*which, side=side, preset="residual").to_dict()
-    of_all = default_settings(*which, side=side, preset="nothing").to_dict()
+    """Return the command that trains with these settings, in the default folder."""
+    side = settings.side
+    default = default_settings(settings.scenario, settings.algorithm, side=side).to_dict()
     stated = {"scenario", "algorithm", "steps", "seed"}
     if side == "target":
         stated |= {"side", "team"}
     words = ["posse", "train"]
     for name, value in settings.to_dict().items():
-        usual = value == default[name] == of_all[name]
-        if name == "folder" or (usual and name not in stated):
+        if name == "folder" or (value == default[name] and name not in stated):
             continue
         option = name.replace("_", "-")
         if isinstance(value, bool):
