@@ -7,6 +7,7 @@ import http.server
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from tests.docs.test_manual import pages, site
@@ -60,10 +61,13 @@ def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> No
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
-def test_pages_are_short_and_break_no_name(site: Path, address: str, width: int, screen: int) -> None:
+def test_pages_are_short_and_break_no_name(
+    site: Path, address: str, width: int, screen: int, scheme: Literal["light", "dark"]
+) -> None:
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": width, "height": screen})
+        page = browser.new_page(viewport={"width": width, "height": screen}, color_scheme=scheme)
         faults = []
         for path in pages(site):
             if path.name == "index.html":
