@@ -79,7 +79,7 @@ reproduce: $(FULL) ## Reproduce the paper's experiments
 tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
 	$(BIN)/python scripts/tune_shipped.py
 
-train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
+train-shipped: $(FULL) ## Train corrections and teams from nothing that ship again (hours); interrupted, it resumes
 	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seed $(SEEDS)) $(if $(ONLY),--scenario $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv

@@ -70,16 +70,8 @@ def row_of(run: TrainSettings, worlds: int) -> dict[str, Any]:
     safe, last = mean(results["safe_score"]), card["curve"][-1]
     numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean())
     values = (
-        *(
-            run.algorithm,
-            run.safeguard,
-            run.scenario,
-            results.scenario.version,
-            run.seed,
-            card["steps"],
-            worlds,
-            TEST_SEED,
-        ),
+        *(run.algorithm, run.safeguard, run.scenario, results.scenario.version),
+        *(run.seed, card["steps"], worlds, TEST_SEED),
         *(f"{number:.6f}" for number in numbers),
         *(round(last["steps"] / last["seconds"]), commit()),
     )

@@ -26,6 +26,7 @@ def main(policies: list[str]) -> None:
     outside = posse.family(inside, name="family-open-outside", **OUTSIDE)
     figure, axes = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
     print("| team | inside | contact | outside | contact | gap |\n|---|---|---|---|---|---|")
+    names = []
     for row, policy in enumerate(policies):
         both = [evaluate(policy, family, WORLDS, progress=False) for family in (inside, outside)]
         scores = [found.estimate("safe_score") for found in both]
@@ -33,12 +34,13 @@ def main(policies: list[str]) -> None:
             f"{score.value:.3f} [{score.low:.3f}, {score.high:.3f}] | {(found.contacts > 0).mean():.1%}"
             for score, found in zip(scores, both, strict=True)
         ]
-        print(f"| `{both[0].policy}` | {' | '.join(cells)} | {scores[1].value - scores[0].value:+.3f} |", flush=True)
+        names.append(both[0].policy)
+        print(f"| `{names[-1]}` | {' | '.join(cells)} | {scores[1].value - scores[0].value:+.3f} |", flush=True)
         for score, place, colour in zip(scores, ("inside", "outside"), ("#2a6f97", "#c8553d"), strict=True):
             reach = np.array([[score.value - score.low], [score.high - score.value]])
             label = place if row == 0 else None
             axes.errorbar(score.value, row, xerr=reach, fmt="o", color=colour, capsize=3, label=label)
-    axes.set_yticks(range(len(policies)), policies)
+    axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()
     axes.set_xlabel("safe score, mean with its 95 % interval")
     axes.legend(frameon=False)

@@ -1,4 +1,4 @@
-"""``make train-shipped``: train every team that ships, with the default settings of its scenario.
+"""``make train-shipped``: train the corrections that ship, and the teams that learned one scenario from nothing.
 
 Finished runs are skipped, an interrupted one resumes. To use more cores, start it for several scenarios at once.
 """

@@ -37,8 +37,8 @@ def all_settings() -> str:
 
 
 def training_defaults() -> str:
-    """Return the settings of a training by ``ppo`` that differ most between scenarios."""
-    names = ("steps", "encoding", "log_deviation", "discount")
+    """Return the settings of the preset ``residual``, by ``ppo``, that differ most between scenarios."""
+    names = ("steps", "log_deviation", "final_log_deviation", "discount")
     rows = []
     for scenario in posse.scenario_names():
         chosen = default_settings(scenario, preset="residual").to_dict()

@@ -100,7 +100,7 @@ _MARKED: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]
 
 
 def typeset(page: str) -> str:
-    """Replace the equations that pymdownx.arithmatex has marked in a page by MathML."""
+    """Replace the equations that pymdownx.arithmatex has marked by MathML, which needs neither scripts nor fonts."""
     return _MARKED.sub(_mathml, page)
 
 

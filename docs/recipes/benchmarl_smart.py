@@ -17,10 +17,7 @@ config.off_policy_train_batch_size = 64
 config.off_policy_n_optimizer_steps = 2
 config.off_policy_memory_size = 1000
 config.evaluation, config.loggers = False, []
-for kind in (
-    MappoConfig,
-    IppoConfig,
-    QmixConfig,
-):  # QMIX acts discretely
-    algorithm = kind.get_from_yaml()  # QMIX acts discretely
+# QMIX is given discrete actions.
+for kind in (MappoConfig, IppoConfig, QmixConfig):
+    algorithm = kind.get_from_yaml()
     Experiment(task, algorithm, model, seed=0, config=config).run()

@@ -227,6 +227,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 raise PolicyError(
                     f"its adviser {adviser!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
                 )
+            if adviser is not None and description.get("correction") == "motion":
+                raise PolicyError("it corrects the actions of its adviser: install the version that wrote it")
             encoding = Encoding.from_dict(description["encoding"])
             return cls(
                 network,
