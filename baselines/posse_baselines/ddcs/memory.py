@@ -125,6 +125,7 @@ MIND, MIND_AT_START = _fields(
     ("target_theta", _F, 0),
     ("target_velocity", _C, 0),
     ("psi_rate", _F, 0),  # turn rate of the slot frame, rad/s
+    ("psi_limit", _F, 0),  # its greatest, rad/s
     ("frame", _C, 0),  # heading of the slot frame
     ("fix_age", _F, 0),  # s
     ("known", _I, 0),  # 1: there is an estimate that is not too old

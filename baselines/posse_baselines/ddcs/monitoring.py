@@ -139,6 +139,7 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     me.target_theta, me.target_velocity = theta, vector(me.target_speed, theta)
     # How fast the frame turns at most: the outermost slot has to be no faster than a tracker.
     limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.outermost
+    me.psi_limit = limit
     psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
     turn = settings.turn_share * me.target_turn * math.exp(-me.fix_age / settings.turn_memory)
     me.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
@@ -159,6 +160,11 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
             me.target_speed = _UNKNOWN_SPEED * me.max_speed
         me.target_mean = scaled(heading, me.target_speed)
     else:
+        # Both headings have the same noise, and of the slot frame it is known how fast it turns.
+        psi_guess = me.fix_psi + clip(wrap(theta - psi), -me.psi_limit * time, me.psi_limit * time)
+        noise = (1.0 - settings.heading_trust) * wrap(psi - psi_guess)
+        theta, psi = wrap(theta - noise), wrap(psi - noise)
+        heading = heading * vector(1.0, -noise)
         guess, _ = target_after(team, me, time)
         turned = wrap(theta - me.fix_theta)
         me.target_turn = 0.0
