@@ -59,7 +59,9 @@ class BeliefSettings:
     plan: PlannerSettings = field(default_factory=PlannerSettings)
     """How far it plays ahead, and what it tries."""
     fix_trust: float = number(0.3, "", 0.01, 1.0)
-    """Share of the difference between a noisy fix and the believed position or heading that is corrected."""
+    """Share of the difference between a noisy fix and the believed position that is corrected."""
+    heading_trust: float = number(0.1, "", 0.01, 1.0)
+    """The same of noisy headings: the slot frame's, and with it the target's."""
     lost_after: float = number(2.0, "s", 0.0, 100.0)
     """Age of a fix up to which the planned motion is played, then the script's."""
 
@@ -235,6 +237,11 @@ class Beliefs(OwnArrays):
         place, theta, frame, velocity = (_complex(told.fix[:, k : k + 2]) for k in (0, 2, 4, 6))
         gap = (w["step"] - seen["step"]) * self.dt
         first = gap > self.settings.lost_after
+        noise = self.layout.scenario.heading_noise
+        if noise > 0.0:  # it is the same of both headings, and how the slot frame turns is known
+            error = np.angle(frame / (w["frame_cos"] + 1j * w["frame_sin"]))
+            excess = np.exp(-1j * np.where(first, 0.0, (1.0 - self.settings.heading_trust) * error))
+            theta, frame, noise = theta * excess, frame * excess, self.settings.heading_trust * noise
         angle = np.angle(theta)
         turn = np.where(gap <= _GAP, _wrap(angle - seen["theta"]) / np.maximum(gap, self.dt), 0.0)
         turn = np.clip(turn, -s.target_turn_rate, s.target_turn_rate)
@@ -247,12 +254,7 @@ class Beliefs(OwnArrays):
         if s.target_is_agent:
             speed = np.clip(np.abs(velocity), s.target_least_speed, s.target_speed)
         goal = _complex(np.stack([w["goal_cos"], w["goal_sin"]], axis=-1))
-        noise = self.layout.scenario.heading_noise
         unforeseen = first | (np.abs(surprise) > max(_AGREES, 3.0 * noise))
-        if noise > 0.0:  # no turn rate can be measured, and only what is far from foreseen says anything
-            theta = np.where(unforeseen, theta, theta * np.exp(1j * (self.settings.fix_trust - 1.0) * surprise))
-            frame = frame * np.exp(1j * (np.angle(theta) - angle))
-            turn, angle = np.where(unforeseen, np.sign(surprise) * s.target_turn_rate, w["turn_rate"]), np.angle(theta)
         if s.target_motion == "smart":
             turning = np.abs(turn) > _TURNS * s.target_turn_rate
             goal = np.where(unforeseen, theta * np.exp(1j * np.where(turning, np.sign(turn), 0.0)), goal)
