@@ -49,6 +49,24 @@ def test_the_estimate_is_nearer_to_the_target_than_the_fix(
     assert np.concatenate(estimated).mean() < share * np.concatenate(fixed).mean()
 
 
+def test_noise_of_the_headings_is_filtered() -> None:
+    noise, errors = 0.1, {}
+    for trust in (1.0, 0.1):
+        policy = DDCS.of("ddcs-distributed").with_settings(heading_trust=trust)
+        batch = posse.batch("smart", 20, message_size=5, autoreset="disabled", split="train", heading_noise=noise)
+        observations, memory, wrong = batch.reset(), begin(policy, batch), []
+        for step in range(120):
+            heading = np.arctan2(batch.state["world_heading_sin"], batch.state["world_heading_cos"])
+            actions, memory = policy.act(observations, memory)
+            if step > 60:
+                estimate = policy.annotations(memory)["estimate"][..., 2]
+                wrong.append(np.angle(np.exp(1j * (estimate - heading[:, None]))))
+            observations = batch.step(actions)[0]
+        errors[trust] = np.std(wrong)
+    assert errors[1.0] == pytest.approx(noise, rel=0.1, abs=0.005)
+    assert errors[0.1] <= 0.5 * noise
+
+
 def test_without_radio_nothing_heard_has_an_effect() -> None:
     policy = load("ddcs-no-radio")
     batch = posse.batch("field", 4, message_size=5)
