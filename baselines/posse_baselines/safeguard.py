@@ -36,6 +36,9 @@ class Guard(OwnArrays):
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
+
+    Attributes:
+        inputs: (E, R, 0): what a network reads of it, nothing; as of :class:`posse_baselines.learned.advice.Advice`.
     """
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
@@ -44,10 +47,12 @@ class Guard(OwnArrays):
         settings = TunedDDCS("ddcs-tuned").settings_for(scenario)
         self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
+        self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 
-    def follow(self, observations: FloatArray) -> None:
-        """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
-        self._observed[...] = in_units(self._layout, observations)
+    def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
+        """Take the observations (E, R, F) of a control step, in the worlds of a mask (E,) or in all."""
+        worlds = ... if mask is None else mask
+        self._observed[worlds] = in_units(self._layout, observations)[worlds]
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
