@@ -29,7 +29,7 @@ from posse_baselines.fields import number, optional, tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import CheckpointError, SettingsError, check_settings, require
-from posse_training.evaluation.episodes import play_shard
+from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import hold_settings, locked, read_json
@@ -277,9 +277,8 @@ class _Run:
         s = self.settings
         threads = s.threads if s.ray is False else 1
         seed, split, indices = worlds
-        calls = [
-            (self.policy.with_settings(**values), None, self.scenario, seed, split, indices) for values in candidates
-        ]
+        teams = [self.policy.with_settings(**values) for values in candidates]
+        calls = [(Match(team, None, self.scenario, seed, split), indices) for team in teams]
         play = partial(play_shard, num_threads=threads)
         if s.ray is False:
             return [play(*call) for call in calls]
