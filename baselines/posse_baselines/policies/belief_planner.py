@@ -361,7 +361,7 @@ class BeliefPlanner(DDCS):
         made_up = 1.0 + minds.team.settings["foresight"][0] * (1.0 / minds.team.world["followed"][0] - 1.0)
         speed, omega = (old + (new - old) / made_up for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
-        wish = (mine["wish_x"] + 1j * mine["wish_y"]) / unit_of(memory.layout.scenario)
+        wish = mine["wish"] / unit_of(memory.layout.scenario)
         wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])
