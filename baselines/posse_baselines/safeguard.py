@@ -26,7 +26,7 @@ from posse_baselines.ddcs.memory import minds_for
 from posse_baselines.ddcs.step import guard_all
 from posse_baselines.laws.offsets import in_units
 from posse_baselines.policy import PolicyError
-from posse_baselines.tuned import TunedDDCS
+from posse_baselines.tuned import tuned_settings
 
 
 class Guard(OwnArrays):
@@ -44,7 +44,7 @@ class Guard(OwnArrays):
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         self._layout, scenario = layout, layout.scenario
         robots = scenario.num_trackers if robots is None else robots
-        settings = TunedDDCS("ddcs-tuned").settings_for(scenario)
+        settings = tuned_settings("ddcs-tuned", scenario)
         self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.inputs = np.zeros((num_worlds, robots, 0), np.float32)

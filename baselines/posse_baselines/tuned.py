@@ -39,13 +39,8 @@ class TunedDDCS(DDCS):
         super().__init__(FAMILY[TUNED[name]], name)
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return the settings tuned for a scenario, or the untuned ones.
-
-        Raises:
-            PolicyError: The file of the settings is damaged.
-        """
-        path = tuned_files(self.name).get(scenario.name)
-        return self.settings if path is None else read_tuned(path).settings
+        """Return :func:`tuned_settings`."""
+        return tuned_settings(self.name, scenario)
 
 
 class TunedFile(DDCS):
@@ -63,6 +58,12 @@ class TunedFile(DDCS):
     def __init__(self, settings: Settings, policy: str, scenario: str, card: Mapping[str, Any]) -> None:
         super().__init__(settings, f"{policy}-tuned-{scenario}")
         self.policy, self.scenario, self.card = policy, scenario, card
+
+
+def tuned_settings(name: str, scenario: Scenario) -> Settings:
+    """Return the settings of a tuned policy, one of :data:`TUNED`, on a scenario: the untuned ones where no file is."""
+    path = tuned_files(name).get(scenario.name)
+    return FAMILY[TUNED[name]] if path is None else read_tuned(path).settings
 
 
 def tuned_files(name: str) -> dict[str, Path]:

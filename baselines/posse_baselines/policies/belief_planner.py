@@ -22,9 +22,9 @@ from posse_baselines.ddcs.memory import Minds
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
 from posse_baselines.laws.offsets import unit_of
-from posse_baselines.policies.planner.policy import PlannerSettings, Search
+from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
 from posse_baselines.policy import Annotations, Memory, check_observations
-from posse_baselines.tuned import TunedDDCS
+from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
@@ -171,12 +171,8 @@ class Beliefs(OwnArrays):
         self._write(seen, self._told[-1])
         worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
         planned = self.search.actions()
-        actions = np.zeros(now.action_shape, np.float32)
+        actions = actions_of_target(now)
         actions[:, : planned.shape[1]] = planned
-        if actions.shape[1] > planned.shape[1]:  # a target that is an agent goes on as it moves now
-            scenario: Any = now.scenario
-            actions[:, -1, 0] = np.clip(2.0 * worlds.world["speed"] / scenario.target_speed - 1.0, -1.0, 1.0)
-            actions[:, -1, 1] = np.clip(worlds.world["turn_rate"] / scenario.target_turn_rate, -1.0, 1.0)
         self._played = (*self._played[1:], actions)
         self.step += 1
         return actions[np.arange(self.rows), own, :2]
@@ -325,22 +321,20 @@ class BeliefPlanner(DDCS):
 
     def __init__(self, settings: BeliefSettings | None = None) -> None:
         super().__init__(name="belief-planner")
-        self._script = TunedDDCS("ddcs-tuned")
         self.plans = settings or BeliefSettings()
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings of ``ddcs-tuned`` for a scenario."""
-        return self._script.settings_for(scenario)
+        return tuned_settings("ddcs-tuned", scenario)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        memory = self._script.begin(layout, num_worlds)
+        memory = super().begin(layout, num_worlds)
         return _Memory(layout, memory.minds, Beliefs(self.plans, layout, num_worlds))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        if isinstance(memory, _Memory):
-            memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
+        memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
         return super().restart(memory, mask)
 
     def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
