@@ -28,8 +28,8 @@ class Tunable:
     above: str = ""
 
 
-def number(default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
-    """Declare a numeric field of a settings class, allowed in [low, high].
+def number(default: float | None, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
+    """Declare a numeric field of a settings class, allowed in [low, high]; whole or ``None`` if its annotation says so.
 
     Args:
         default: Its value.
@@ -53,12 +53,6 @@ def choice(default: str, choices: tuple[str, ...]) -> Any:
     return dataclasses.field(default=default, metadata={"choices": choices})
 
 
-def optional(low: float, high: float, *, whole: bool = False) -> Any:
-    """Declare a field that is ``None`` by default, or a number in [low, high]; a whole one if so said."""
-    meta = {"unit": "", "low": low, "high": high, "above": "", "whole": whole}
-    return dataclasses.field(default=None, metadata=meta)
-
-
 def _text(number: float) -> str:
     return str(number) if isinstance(number, int) else f"{number:g}"
 
@@ -77,9 +71,9 @@ def check(settings: Any) -> None:
             choices = get_args(get_type_hints(type(settings))[name])
         if value not in choices:
             raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
-        if "low" not in meta or (value is None and field.default is None):
+        if "low" not in meta or (value is None and "None" in str(field.type)):
             continue
-        whole = meta.get("whole", isinstance(field.default, int))
+        whole = "int" in str(field.type)
         if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
             raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
         if not meta["low"] <= value <= meta["high"]:
@@ -94,12 +88,7 @@ def tunables(settings: Any) -> tuple[Tunable, ...]:
     """Return the tunable fields of a settings object, with its values as defaults."""
     return tuple(
         Tunable(
-            field.name,
-            getattr(settings, field.name),
-            field.metadata["low"],
-            field.metadata["high"],
-            field.metadata["unit"],
-            field.metadata["above"],
+            field.name, getattr(settings, field.name), *(field.metadata[k] for k in ("low", "high", "unit", "above"))
         )
         for field in dataclasses.fields(settings)
         if field.metadata.get("tunable")
