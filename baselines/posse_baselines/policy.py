@@ -156,11 +156,22 @@ def begin(policy: Policy, batch: Batch) -> Memory:
     return policy.begin(batch.layout, batch.num_worlds)
 
 
-class FunctionPolicy(BasePolicy):
-    """What :func:`from_function` returns."""
+class from_function(BasePolicy):  # noqa: N801 (used as a function is)
+    """A policy that calls a function, for all that takes a policy.
 
-    def __init__(self, function: Function, name: str, message_size: int, discrete_actions: bool) -> None:
-        self.name = name
+    Args:
+        function: Observations (E, N, F) float32 -> actions (E, N, 2) in [-1, 1], or (E, N, 2 + m).
+            It has no memory of earlier steps.
+        name: Its name in results; default: the function's.
+        message_size: Numbers that it adds to each broadcast, m.
+        discrete_actions: Whether it returns numbers (E, N) of
+            :data:`posse.adapters.actions.MOTIONS`.
+    """
+
+    def __init__(
+        self, function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
+    ) -> None:
+        self.name = getattr(function, "__name__", "function") if name is None else name
         self.message_size = message_size
         self._function = function
         self._discrete = discrete_actions
@@ -185,20 +196,3 @@ class FunctionPolicy(BasePolicy):
         actions = np.zeros((*team, length), np.float32)
         actions[..., : chosen.shape[2]] = chosen
         return actions, memory
-
-
-def from_function(
-    function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
-) -> FunctionPolicy:
-    """Return a policy that calls a function, for all that takes a policy.
-
-    Args:
-        function: Observations (E, N, F) float32 -> actions (E, N, 2) in [-1, 1], or (E, N, 2 + m).
-            It has no memory of earlier steps.
-        name: Its name in results; default: the function's.
-        message_size: Numbers that it adds to each broadcast, m.
-        discrete_actions: Whether it returns numbers (E, N) of
-            :data:`posse.adapters.actions.MOTIONS`.
-    """
-    named: str = getattr(function, "__name__", "function") if name is None else name
-    return FunctionPolicy(function, named, message_size, discrete_actions)
