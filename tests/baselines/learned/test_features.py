@@ -112,15 +112,15 @@ def test_nothing_known_of_the_target_is_zeros() -> None:
 @given(robots=st.integers(1, 9), slots=st.integers(1, 12), seed=st.integers(0, 2**31))
 def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> None:
     ways = np.random.default_rng(seed).uniform(0, 10, (robots, slots)).astype(np.float32)
-    chosen = np.empty(robots, np.float32)
+    chosen = np.empty(robots, np.int64)
     match_slots(robots, slots, ways.T, chosen)
-    given_out = [int(s) for s in chosen if s >= 0]
+    given_out = [s for s in chosen if s >= 0]
     assert len(given_out) == len(set(given_out)) == min(robots, slots)
     if robots <= slots:
-        total = ways[np.arange(robots), chosen.astype(int)].sum()
+        total = ways[np.arange(robots), chosen].sum()
         for i in range(robots):
             for j in range(i):
-                other = chosen.astype(int)
+                other = chosen.copy()
                 other[[i, j]] = other[[j, i]]
                 assert ways[np.arange(robots), other].sum() >= total - 1e-3
 
