@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds
@@ -37,14 +37,12 @@ _APART: Final = 10  # control steps between two turn rates from which a weave is
 _USUAL: Final = math.cos(0.5 * 0.1 * _APART)  # of a weave of 0.5 rad/s
 _KEPT: Final = 0.99  # share of what was learned of a weave that is kept in a step
 
-_SEEN: Final[np.dtype[Any]] = np.dtype(
-    [
-        ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
-        ("theta", np.float64),  # heading then, rad
-        ("turns", np.float64, (2 * _APART + 1,)),  # turn rates of the last steps before it, rad/s; NaN: not measured
-        ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
-        ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
-    ]
+_SEEN: Final = record_type(
+    ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
+    ("theta", np.float64),  # heading then, rad
+    ("turns", np.float64, (2 * _APART + 1,)),  # turn rates of the last steps before it, rad/s; NaN: not measured
+    ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
+    ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
 )
 
 
@@ -79,8 +77,13 @@ class _Told(NamedTuple):
     """(R, N, 6) by :data:`_ROBOT`, in the common frame."""
     fixed: BoolArray
     """(R,) whether there is a fix of the target."""
-    fix: FloatArray
-    """(R, 8) its position, heading, slot frame and velocity, each a pair."""
+    fix: npt.NDArray[np.complex64]
+    """(R, 4) its position, heading, slot frame and velocity."""
+
+
+def _told_nothing(rows: int, n: int) -> _Told:
+    heard, robots = np.zeros((rows, n), np.bool_), np.zeros((rows, n, len(_ROBOT)), np.float32)
+    return _Told(heard, robots, np.zeros(rows, np.bool_), np.zeros((rows, 4), np.complex64))
 
 
 def believed(scenario: Scenario) -> Scenario:
@@ -130,17 +133,12 @@ class Beliefs(OwnArrays):
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past
         self.step, self.newest, self.age = (np.zeros(self.rows, np.int64) for _ in range(3))
         shape = self.rows, scenario.num_trackers
-        self._told = tuple(self._nothing(*shape) for _ in range(window + 1))  # of each moment, oldest first
+        self._told = tuple(_told_nothing(*shape) for _ in range(window + 1))  # of each moment, oldest first
         self._played = tuple(np.zeros(self.now.action_shape, np.float32) for _ in range(window + 1))
         self.search = Search(settings.plan, self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
         self.search.teams.late[:] = settings.unseen_delay * (np.array(arms) > scenario.sensing_range)
         self.restart(np.ones(self.rows, np.bool_))
-
-    @staticmethod
-    def _nothing(rows: int, n: int) -> _Told:
-        heard, robots = np.zeros((rows, n), np.bool_), np.zeros((rows, n, len(_ROBOT)), np.float32)
-        return _Told(heard, robots, np.zeros(rows, np.bool_), np.zeros((rows, 8), np.float32))
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the rows of a mask (R,)."""
@@ -163,7 +161,7 @@ class Beliefs(OwnArrays):
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
         self._advance(self._seen, self._told[0], self._played[0])
         self._past.write(worlds)
-        self._told = (*self._told[1:], self._nothing(*working.shape))
+        self._told = (*self._told[1:], _told_nothing(*working.shape))
         own = self._listen(observations)
         seen = self._seen.copy()
         for told, played in zip(self._told[:-1], self._played[1:], strict=True):
@@ -215,7 +213,7 @@ class Beliefs(OwnArrays):
         velocity = _complex(v["target_velocity"]) * heading
         late = np.maximum(age - window, 0.0) * self.dt
         place = place + late * self.now.scenario.target_speed * theta
-        fix = np.stack([part for each in (place, theta, frame, velocity) for part in (each.real, each.imag)], axis=-1)
+        fix = np.stack([place, theta, frame, velocity], axis=-1)
         for told, back in zip(self._told, range(window, -1, -1), strict=True):
             here = fresh & (np.minimum(age, window) == back)
             told.fixed[here], told.fix[here] = True, fix[here]
@@ -228,7 +226,7 @@ class Beliefs(OwnArrays):
         for k, name in enumerate(_ROBOT):
             worlds.tracker[name][told.heard] = told.robots[told.heard, k]
         here = told.fixed
-        place, theta, frame, velocity = (_complex(told.fix[:, k : k + 2]) for k in (0, 2, 4, 6))
+        place, theta, frame, velocity = told.fix.T.astype(np.complex128)
         gap = (w["step"] - seen["step"]) * self.dt
         first = gap > self.settings.lost_after
         angle = np.angle(theta)
@@ -259,12 +257,11 @@ class Beliefs(OwnArrays):
             goal = np.where(first | (np.abs(surprise) > 10 * _AGREES), theta, goal * np.exp(1j * surprise))
         if s.target_motion == "accelerating":
             self._tell_weave(seen, here, gap, turn)
-        for name, value in (
-            *(("x", place.real), ("y", place.imag), ("speed", speed), ("turn_rate", turn)),
-            *(("heading_cos", theta.real), ("heading_sin", theta.imag), ("frame_cos", frame.real)),
-            *(("frame_sin", frame.imag), ("goal_cos", goal.real), ("goal_sin", goal.imag)),
-        ):
-            w[name][here] = value[here]
+        w["x"][here], w["y"][here], w["speed"][here], w["turn_rate"][here] = (
+            value[here] for value in (place.real, place.imag, speed, turn)
+        )
+        for name, direction in (("heading", theta), ("frame", frame), ("goal", goal)):
+            w[f"{name}_cos"][here], w[f"{name}_sin"][here] = direction.real[here], direction.imag[here]
         seen["step"][here], seen["theta"][here] = w["step"][here], angle[here]
 
     def _tell_weave(self, seen: Records, here: BoolArray, gap: FloatArray, turn: FloatArray) -> None:

@@ -59,7 +59,7 @@ class Teams(NamedTuple):
 
     config: Records
     """(1,) the scenario as kernels read it."""
-    slots: Records
+    slots: npt.NDArray[np.complex64]
     """(N,) position of each slot in the slot frame, m."""
     ways: Records
     """(E, N) :data:`WAY`."""
@@ -78,14 +78,13 @@ class Teams(NamedTuple):
 class Scene(NamedTuple):
     """One world as the law reads it."""
 
+    teams: Teams
     config: Record
-    slots: Records
     world: Record
     trackers: Records
     obstacles: Records
     ways: Records
     plans: Records
-    late: FloatArray
     path: FloatArray
     since: int
     """Control steps since the path began; -1: there is none."""
@@ -98,7 +97,8 @@ def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
     num_worlds, n = ways.shape
     paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
     plans, late = np.full(ways.shape, PLAN_AT_START), np.zeros(n, np.float32)
-    return Teams(config_record(scenario), slot_records(scenario), ways, plans, late, paths, begun, work_for(n))
+    slots = np.array([complex(slot.x, slot.y) for slot in slot_records(scenario)], np.complex64)
+    return Teams(config_record(scenario), slots, ways, plans, late, paths, begun, work_for(n))
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
@@ -115,7 +115,8 @@ def velocity_of(r: Record) -> complex:
 @compiled
 def arm_of(scene: Scene, slot: int) -> complex:
     """Return where a slot is from the target, m."""
-    return complex(scene.slots[slot].x, scene.slots[slot].y) * complex(scene.world.frame_cos, scene.world.frame_sin)
+    place: complex = scene.teams.slots[slot]
+    return place * complex(scene.world.frame_cos, scene.world.frame_sin)
 
 
 @compiled
@@ -125,7 +126,7 @@ def course_of(scene: Scene) -> Course:
 
 
 @compiled
-def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
+def foreseen(path: FloatArray, at: float, slot: complex) -> complex:
     """Return where a slot will be, m, ``at`` control steps along a path.
 
     The path (T, 4) is the target's x, y and the slot frame's cosine and sine at each step; beyond
@@ -138,11 +139,11 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
     s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
     x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
     y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
-    return complex(x, y) + complex(slot.x, slot.y) * complex(c, s)
+    return complex(x, y) + slot * complex(c, s)
 
 
 @compiled
-def arrival_time(scene: Scene, i: int, slot: Record) -> float:
+def arrival_time(scene: Scene, i: int, slot: complex) -> float:
     """Return when tracker i can be in a slot on the foreseen path, straight on at full speed, s from now.
 
     A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds
@@ -172,12 +173,12 @@ def assign_slots(scene: Scene, work: Work) -> None:
         for k in range(n):
             way = complex(w.x, w.y) + arm_of(scene, k) - complex(t.x, t.y)
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene, i, scene.slots[k])
+                time = arrival_time(scene, i, scene.teams.slots[k])
             else:
                 time = time_to_slot(way, course_of(scene), speed)
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
-            time += scene.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
+            time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
             work.cost[rows, k] = time
@@ -221,9 +222,9 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene, i, scene.slots[slot])
+        time = arrival_time(scene, i, scene.teams.slots[slot])
         if time > _SOON:
-            goal = foreseen(scene.path, scene.since + time / dt, scene.slots[slot])
+            goal = foreseen(scene.path, scene.since + time / dt, scene.teams.slots[slot])
             moved = goal - complex(w.x, w.y) - arm
             velocity = complex(moved.real / time, moved.imag / time)
             offset = way_round(start, arm, _CLEARANCE) + shift - start
@@ -285,14 +286,13 @@ def drive_all(
             config, world, shared = teams.config[0], worlds.world[e], e // copies
             begun = teams.begun[shared]
             scene = Scene(
+                teams,
                 config,
-                teams.slots,
                 world,
                 worlds.tracker[e],
                 worlds.obstacle[e],
                 teams.ways[e],
                 teams.plans[e],
-                teams.late,
                 teams.paths[shared],
                 world.step - begun if 0 <= begun <= world.step else -1,
                 frame_rate_of(config, world),
