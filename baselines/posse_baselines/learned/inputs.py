@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,8 +30,7 @@ MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
 
-@dataclass(frozen=True)
-class EncodedField:
+class EncodedField(NamedTuple):
     """One field that a network reads; ``unknown`` replaces it where it is missing."""
 
     name: str
@@ -104,7 +103,7 @@ class Encoding:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the encoding as plain values."""
-        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(astuple(f)) for f in self.fields]}
+        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(f) for f in self.fields]}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
