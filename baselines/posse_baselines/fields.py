@@ -28,24 +28,18 @@ class Tunable:
     above: str = ""
 
 
-def number(default: float | None, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
+def number(default: float | None, unit: str, low: float, high: float) -> Any:
     """Declare a numeric field of a settings class, allowed in [low, high]; whole or ``None`` if its annotation says so.
 
-    Args:
-        default: Its value.
-        unit: Empty for a plain number.
-        low: Least value.
-        high: Greatest value.
-        tune: Whether a search may change it.
-        above: Name of another field that it must exceed; empty: none.
+    The unit is empty for a plain number.
     """
-    meta = {"unit": unit, "low": low, "high": high, "tunable": tune, "above": above}
-    return dataclasses.field(default=default, metadata=meta)
+    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high})
 
 
 def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
-    """Declare a numeric field that a search may change."""
-    return number(default, unit, low, high, tune=True, above=above)
+    """Declare a number that a search may change, and that must exceed the field named ``above`` if there is one."""
+    meta = {"unit": unit, "low": low, "high": high, "above": above}
+    return dataclasses.field(default=default, metadata=meta)
 
 
 def choice(default: str, choices: tuple[str, ...]) -> Any:
@@ -79,9 +73,8 @@ def check(settings: Any) -> None:
         if not meta["low"] <= value <= meta["high"]:
             unit = f" {meta['unit']}" if meta["unit"] else ""
             raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
-        if meta["above"] and not getattr(settings, meta["above"]) < value:
-            low = getattr(settings, meta["above"])
-            raise ValueError(f"{meta['above']}={low!r} must be below {name}={value!r}: a hysteresis")
+        if (below := meta.get("above")) and not getattr(settings, below) < value:
+            raise ValueError(f"{below}={getattr(settings, below)!r} must be below {name}={value!r}: a hysteresis")
 
 
 def tunables(settings: Any) -> tuple[Tunable, ...]:
@@ -91,5 +84,5 @@ def tunables(settings: Any) -> tuple[Tunable, ...]:
             field.name, getattr(settings, field.name), *(field.metadata[k] for k in ("low", "high", "unit", "above"))
         )
         for field in dataclasses.fields(settings)
-        if field.metadata.get("tunable")
+        if "above" in field.metadata  # only `tuned` says it
     )
