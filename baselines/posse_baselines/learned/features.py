@@ -15,17 +15,17 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Record, compiled, record_type
+from posse.numeric import ONE, FloatArray, Record, compiled, record_type
 from posse_baselines.ddcs.memory import pair
-from posse_baselines.laws.geometry import angle_of, clip, length, scaled
+from posse_baselines.laws.geometry import angle_of, length, scaled
 
-_SMALL: Final = 1e-6
-_LARGE: Final = 1e9
-_NEAR: Final = 0.3  # m, the default tolerance
-_FAR: Final = 3.0  # m
-_GAIN: Final = 0.8  # 1/s, of the slot law
-_TURN_GAIN: Final = 3.0  # 1/s
-_OLDEST: Final = 2.0  # s; a position is extrapolated for this long at most
+_SMALL: Final = np.float32(1e-6)
+_LARGE: Final = np.float32(1e9)
+_NEAR: Final = np.float32(0.3)  # m, the default tolerance
+_FAR: Final = np.float32(3.0)  # m
+_GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
+_TURN_GAIN: Final = np.float32(3.0)  # 1/s
+_OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _BIT: Final = np.uint64(1)
 
 MOST: Final = 16
@@ -59,7 +59,7 @@ NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 
 TEAM: Final = record_type(
     ("count", np.int64),
-    ("places", np.complex128, (MOST,)),  # m
+    ("places", _C, (MOST,)),  # m
     ("numbers", np.int64, (MOST,)),
     ("slots", np.int64, (MOST,)),  # -1: none left
 )
@@ -80,7 +80,7 @@ def write_features(
     out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
     for m in range(min(team.count - 1, _MATES)):
         place = m * f.stride
-        out.mates[m, 0] = _soft(team.places[m + 1], 1.0)
+        out.mates[m, 0] = _soft(team.places[m + 1], ONE)
         out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
     if row[f.target_known] == 0.0:
         return
@@ -89,34 +89,42 @@ def write_features(
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
     for s in range(len(slots)):
-        place = target + slots[s] * frame
+        place = _place_of(slots[s], target, frame)
         for j in range(team.count):
             ways[s, j] = length(team.places[j] - place)
     match_slots(team.count, len(slots), ways, team.slots)
     slot = slots[max(team.slots[me], 0)]
-    way = target + slot * frame
+    way = _place_of(slot, target, frame)
     d = length(way)
-    out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + 1.0)
-    out.target, out.target_velocity, out.frame, out.slot = _soft(target, 1.0), velocity, frame, _soft(slot, _FAR)
+    out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + ONE)
+    out.target, out.target_velocity, out.frame, out.slot = _soft(target, ONE), velocity, frame, _soft(slot, _FAR)
     out.target_heading = pair(row, f.target_heading) * frame.conjugate()
     # The slot law: the slot's velocity plus a velocity towards it, proportional to the distance.
-    wish = velocity + scaled(way, _GAIN)
+    wish = velocity + complex(_GAIN * way.real, _GAIN * way.imag)
     wanted = length(wish)
-    out.law_speed, out.law_direction = min(wanted / top, 1.0), scaled(wish, 1.0 / (wanted + _SMALL))
-    out.law_turn = clip(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], -1.0, 1.0)
+    out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
+    out.law_turn = max(-ONE, min(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], ONE))
     held = 0
     for j in range(team.count):
         s = team.slots[j]
         if s >= 0 and j != me:
             held += ways[s, j] < _NEAR
     out.held = held / max(team.count - 1, 1)
-    out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + 1.0), 1.0
+    out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
 
 
 @compiled
-def _soft(v: complex, scale: float) -> complex:
+def _soft(v: complex, scale: np.float32) -> complex:
     """Return a vector whose length d is scaled to d / (d + scale)."""
-    return scaled(v, 1.0 / (length(v) + scale))
+    far = length(v) + scale
+    return complex(v.real / far, v.imag / far)
+
+
+@compiled
+def _place_of(slot: complex, target: complex, frame: complex) -> complex:
+    """Return where a slot of a target is; rounded in this order, as networks learned to read it."""
+    x, y = target.real + slot.real * frame.real, target.imag + slot.real * frame.imag
+    return complex(x - slot.imag * frame.imag, y + slot.imag * frame.real)
 
 
 @compiled
