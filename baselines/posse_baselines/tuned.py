@@ -47,17 +47,15 @@ class TunedFile(DDCS):
     """A DDCS policy that plays the settings of one file on every scenario.
 
     Attributes:
-        policy: Name of the policy whose settings were tuned.
-        scenario: Name of the scenario that they were tuned for.
-        settings: All settings of the tuned policy.
-        card: Everything that the file says.
+        card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
+            tuned for, and more.
     """
 
     trained_splits = ("train",)
 
-    def __init__(self, settings: Settings, policy: str, scenario: str, card: Mapping[str, Any]) -> None:
-        super().__init__(settings, f"{policy}-tuned-{scenario}")
-        self.policy, self.scenario, self.card = policy, scenario, card
+    def __init__(self, settings: Settings, card: Mapping[str, Any]) -> None:
+        super().__init__(settings, f"{card['policy']}-tuned-{card['scenario']}")
+        self.card = card
 
 
 def tuned_settings(name: str, scenario: Scenario) -> Settings:
@@ -104,4 +102,4 @@ def read_tuned(path: Path) -> TunedFile:
         settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
     except (TypeError, ValueError, OverflowError) as error:
         raise PolicyError(f"{path} has impossible settings: {error}") from error
-    return TunedFile(settings, policy, scenario, card)
+    return TunedFile(settings, card)

@@ -68,14 +68,6 @@ def test_fewer_places_keep_the_nearest() -> None:
     np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
 
 
-def test_unknown_encodings_are_refused() -> None:
-    layout = posse.ObservationLayout(posse.get_scenario("smart"))
-    with pytest.raises(PolicyError, match="plain, slots"):
-        Encoding.of(layout, "fancy")
-    with pytest.raises(PolicyError, match="neighbours=-1"):
-        Encoding.of(layout, neighbours=-1)
-
-
 def test_own_slot_is_where_the_state_says() -> None:
     batch, observations = observations_of("constant", worlds=8, steps=30)
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
