@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -300,25 +300,3 @@ def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, 
         PolicyError: As :func:`rollout`.
     """
     return rollout(batch, policy, seed=seed).metrics
-
-
-def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
-    """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
-
-    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
-
-    Raises:
-        PolicyError: There are no trackers, or one is missing.
-    """
-    names = [name for name in observations if name.startswith("tracker_")]
-    wanted = [f"tracker_{i}" for i in range(len(names))]
-    if not names or set(names) != set(wanted):
-        raise PolicyError(
-            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
-        )
-    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
-
-
-def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:
-    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
-    return {name: actions[0, int(name.removeprefix("tracker_"))] for name in agents if name.startswith("tracker_")}

@@ -13,7 +13,7 @@ memory passed to ``act`` or ``restart`` must not be used again; use the one that
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -196,3 +196,25 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         actions = np.zeros((*team, length), np.float32)
         actions[..., : chosen.shape[2]] = chosen
         return actions, memory
+
+
+def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
+    """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
+
+    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
+
+    Raises:
+        PolicyError: There are no trackers, or one is missing.
+    """
+    names = [name for name in observations if name.startswith("tracker_")]
+    wanted = [f"tracker_{i}" for i in range(len(names))]
+    if not names or set(names) != set(wanted):
+        raise PolicyError(
+            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
+        )
+    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
+
+
+def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
+    return {name: actions[0, int(name.removeprefix("tracker_"))] for name in agents if name.startswith("tracker_")}

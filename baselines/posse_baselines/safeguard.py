@@ -25,7 +25,7 @@ from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.memory import minds_for
 from posse_baselines.ddcs.step import guard_all
 from posse_baselines.laws.offsets import in_units
-from posse_baselines.policy import PolicyError
+from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 
 
@@ -131,23 +131,17 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
         super().__init__(env)
         for agent in env.possible_agents:
             _check_continuous(env.action_space(agent))
-        self._trackers = [agent for agent in env.possible_agents if agent.startswith("tracker_")]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
         observations, infos = self.env.reset(seed=seed, options=options)
         self._guard = Guard(self.env.unwrapped.layout, 1)
-        self._observe(observations)
+        self._guard.follow(stack_agents(observations))
         return observations, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        wanted = np.stack([np.asarray(actions[agent], np.float32) for agent in self._trackers])
-        motions = self._guard.actions(wanted[None])[0]
-        guarded = {**actions, **dict(zip(self._trackers, motions, strict=True))}
-        result: tuple[Any, Any, Any, Any, Any] = self.env.step(guarded)
-        self._observe(result[0])
+        motions = self._guard.actions(stack_agents(actions))
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **split_agents(motions, actions)})
+        self._guard.follow(stack_agents(result[0]))
         return result
-
-    def _observe(self, observations: Mapping[str, Any]) -> None:
-        self._guard.follow(np.stack([observations[agent] for agent in self._trackers])[None])
