@@ -5,8 +5,18 @@ from __future__ import annotations
 from posse_baselines.ddcs import DDCS
 from posse_baselines.deploy import Deployed, deploy
 from posse_baselines.fields import Tunable, tunables
-from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout, split_agents, stack_agents
-from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
+from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    Policy,
+    PolicyError,
+    StateReader,
+    begin,
+    from_function,
+    split_agents,
+    stack_agents,
+)
 from posse_baselines.registry import Target, load, load_target, policy_names, target_names
 from posse_baselines.safeguard import Safeguard
 from posse_baselines.tracker_env import register

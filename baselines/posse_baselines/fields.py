@@ -28,35 +28,23 @@ class Tunable:
     above: str = ""
 
 
-def number(default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
-    """Declare a numeric field of a settings class, allowed in [low, high].
+def number(default: float | None, unit: str, low: float, high: float) -> Any:
+    """Declare a numeric field of a settings class, allowed in [low, high]; whole or ``None`` if its annotation says so.
 
-    Args:
-        default: Its value.
-        unit: Empty for a plain number.
-        low: Least value.
-        high: Greatest value.
-        tune: Whether a search may change it.
-        above: Name of another field that it must exceed; empty: none.
+    The unit is empty for a plain number.
     """
-    meta = {"unit": unit, "low": low, "high": high, "tunable": tune, "above": above}
-    return dataclasses.field(default=default, metadata=meta)
+    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high})
 
 
 def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
-    """Declare a numeric field that a search may change."""
-    return number(default, unit, low, high, tune=True, above=above)
+    """Declare a number that a search may change, and that must exceed the field named ``above`` if there is one."""
+    meta = {"unit": unit, "low": low, "high": high, "above": above}
+    return dataclasses.field(default=default, metadata=meta)
 
 
 def choice(default: str, choices: tuple[str, ...]) -> Any:
     """Declare a field that names one of several laws."""
     return dataclasses.field(default=default, metadata={"choices": choices})
-
-
-def optional(low: float, high: float, *, whole: bool = False) -> Any:
-    """Declare a field that is ``None`` by default, or a number in [low, high]; a whole one if so said."""
-    meta = {"unit": "", "low": low, "high": high, "above": "", "whole": whole}
-    return dataclasses.field(default=None, metadata=meta)
 
 
 def _text(number: float) -> str:
@@ -77,30 +65,24 @@ def check(settings: Any) -> None:
             choices = get_args(get_type_hints(type(settings))[name])
         if value not in choices:
             raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
-        if "low" not in meta or (value is None and field.default is None):
+        if "low" not in meta or (value is None and "None" in str(field.type)):
             continue
-        whole = meta.get("whole", isinstance(field.default, int))
+        whole = "int" in str(field.type)
         if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
             raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
         if not meta["low"] <= value <= meta["high"]:
             unit = f" {meta['unit']}" if meta["unit"] else ""
             raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
-        if meta["above"] and not getattr(settings, meta["above"]) < value:
-            low = getattr(settings, meta["above"])
-            raise ValueError(f"{meta['above']}={low!r} must be below {name}={value!r}: a hysteresis")
+        if (below := meta.get("above")) and not getattr(settings, below) < value:
+            raise ValueError(f"{below}={getattr(settings, below)!r} must be below {name}={value!r}: a hysteresis")
 
 
 def tunables(settings: Any) -> tuple[Tunable, ...]:
     """Return the tunable fields of a settings object, with its values as defaults."""
     return tuple(
         Tunable(
-            field.name,
-            getattr(settings, field.name),
-            field.metadata["low"],
-            field.metadata["high"],
-            field.metadata["unit"],
-            field.metadata["above"],
+            field.name, getattr(settings, field.name), *(field.metadata[k] for k in ("low", "high", "unit", "above"))
         )
         for field in dataclasses.fields(settings)
-        if field.metadata.get("tunable")
+        if "above" in field.metadata  # only `tuned` says it
     )

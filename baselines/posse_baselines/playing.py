@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -119,7 +120,7 @@ class Recorder:
         self.over = np.zeros(self.batch.num_worlds, np.bool_)
         self.steps = 0
         self._lengths = np.zeros(self.batch.num_worlds, np.int64)
-        self._rows: dict[str, list[Array]] = {}
+        self._rows: dict[str, list[Array]] = defaultdict(list)
         self._metrics: dict[str, npt.NDArray[np.float64]] = {}
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
@@ -133,7 +134,8 @@ class Recorder:
         self, actions: npt.ArrayLike, annotations: Annotations | None = None
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance the batch (see :meth:`posse.Batch.step`) and record the step, with the annotations of a policy."""
-        noted = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
+        rows: dict[str, Any] = {}
+        rows["annotations"] = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
@@ -144,19 +146,17 @@ class Recorder:
                 column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
                 column[ended] = infos[f"metrics/{name}"][ended]
             self.over |= ended
-        if "annotations" in self._names:
-            self._keep(noted)
-        terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
-        actions = np.array(actions, np.float32)
+        rows |= {"score": infos["score"], "terminated": terminated, "truncated": truncated, "rewards": rewards}
+        rows["actions"] = np.array(actions, np.float32)
+        rows["terms"] = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
         if isinstance(self.batch, PairedBatch):
-            actions, every = self.batch.everyone
-            observations, rewards = every.observations, every.rewards
-            terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
-        if "terms" in self._names:
-            self._keep(terms)
-        told = {"actions": actions, "rewards": rewards, "score": infos["score"]}
-        told |= {"terminated": terminated, "truncated": truncated}
-        self._keep({name: array for name, array in told.items() if name in self._names})
+            rows["actions"], every = self.batch.everyone
+            observations, rows["rewards"] = every.observations, every.rewards
+            rows["terms"] = dict(zip(rows["terms"], np.moveaxis(every.terms, -1, 0), strict=True))
+        for name in self._names:
+            if name in _STEPS:
+                for each, row in (rows[name] if isinstance(rows[name], dict) else {name: rows[name]}).items():
+                    self._rows[each].append(row)
         self._keep_frame(observations)
         return done
 
@@ -164,15 +164,11 @@ class Recorder:
         state = self.batch.state
         for name in self._names:
             if name == "observations":
-                self._keep({name: observations})
+                self._rows[name].append(observations)
             elif name in ("tracker_pose", "target_pose"):
-                self._keep({name: poses_of(state, "world" if name == "target_pose" else "tracker")})
+                self._rows[name].append(poses_of(state, "world" if name == "target_pose" else "tracker"))
             elif name not in _STEPS:
-                self._keep({name: state[name].copy()})
-
-    def _keep(self, rows: Mapping[str, Array]) -> None:
-        for name, row in rows.items():
-            self._rows.setdefault(name, []).append(row)
+                self._rows[name].append(state[name].copy())
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded since the reset."""
@@ -304,25 +300,3 @@ def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, 
         PolicyError: As :func:`rollout`.
     """
     return rollout(batch, policy, seed=seed).metrics
-
-
-def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
-    """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
-
-    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
-
-    Raises:
-        PolicyError: There are no trackers, or one is missing.
-    """
-    names = [name for name in observations if name.startswith("tracker_")]
-    wanted = [f"tracker_{i}" for i in range(len(names))]
-    if not names or set(names) != set(wanted):
-        raise PolicyError(
-            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
-        )
-    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
-
-
-def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:
-    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
-    return {name: actions[0, int(name.removeprefix("tracker_"))] for name in agents if name.startswith("tracker_")}

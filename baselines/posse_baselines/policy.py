@@ -13,7 +13,7 @@ memory passed to ``act`` or ``restart`` must not be used again; use the one that
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -156,11 +156,22 @@ def begin(policy: Policy, batch: Batch) -> Memory:
     return policy.begin(batch.layout, batch.num_worlds)
 
 
-class FunctionPolicy(BasePolicy):
-    """What :func:`from_function` returns."""
+class from_function(BasePolicy):  # noqa: N801 (used as a function is)
+    """A policy that calls a function, for all that takes a policy.
 
-    def __init__(self, function: Function, name: str, message_size: int, discrete_actions: bool) -> None:
-        self.name = name
+    Args:
+        function: Observations (E, N, F) float32 -> actions (E, N, 2) in [-1, 1], or (E, N, 2 + m).
+            It has no memory of earlier steps.
+        name: Its name in results; default: the function's.
+        message_size: Numbers that it adds to each broadcast, m.
+        discrete_actions: Whether it returns numbers (E, N) of
+            :data:`posse.adapters.actions.MOTIONS`.
+    """
+
+    def __init__(
+        self, function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
+    ) -> None:
+        self.name = getattr(function, "__name__", "function") if name is None else name
         self.message_size = message_size
         self._function = function
         self._discrete = discrete_actions
@@ -187,18 +198,23 @@ class FunctionPolicy(BasePolicy):
         return actions, memory
 
 
-def from_function(
-    function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
-) -> FunctionPolicy:
-    """Return a policy that calls a function, for all that takes a policy.
+def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
+    """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
 
-    Args:
-        function: Observations (E, N, F) float32 -> actions (E, N, 2) in [-1, 1], or (E, N, 2 + m).
-            It has no memory of earlier steps.
-        name: Its name in results; default: the function's.
-        message_size: Numbers that it adds to each broadcast, m.
-        discrete_actions: Whether it returns numbers (E, N) of
-            :data:`posse.adapters.actions.MOTIONS`.
+    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
+
+    Raises:
+        PolicyError: There are no trackers, or one is missing.
     """
-    named: str = getattr(function, "__name__", "function") if name is None else name
-    return FunctionPolicy(function, named, message_size, discrete_actions)
+    names = [name for name in observations if name.startswith("tracker_")]
+    wanted = [f"tracker_{i}" for i in range(len(names))]
+    if not names or set(names) != set(wanted):
+        raise PolicyError(
+            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
+        )
+    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
+
+
+def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
+    return {name: actions[0, int(name.removeprefix("tracker_"))] for name in agents if name.startswith("tracker_")}

@@ -20,7 +20,7 @@ from posse_baselines.policies.scripted import ABLATIONS, SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import read_tuned
 
-_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": read_tuned}
+FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": read_tuned}
 """Readers of policy files, by suffix."""
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
@@ -67,19 +67,14 @@ def policy_names() -> tuple[str, ...]:
     return (*SCRIPTED, *shipped())
 
 
-def shipped() -> dict[str, Path]:
-    """Return the files of the learned policies that come with the package, by name."""
-    return {path.stem: path for path in sorted(SHIPPED.glob("*.safetensors"))}
+def shipped(folder: Path = SHIPPED) -> dict[str, Path]:
+    """Return the files of the learned policies that come with the package, or of the targets, by name."""
+    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
 
 
 def target_names() -> tuple[str, ...]:
     """Return the names of all targets: the motions that are declared, those that read nothing, the learned ones."""
-    return (*(name for name in TARGET_MOTIONS if name != AGENT), *OPEN_LOOP, *shipped_targets())
-
-
-def shipped_targets() -> dict[str, Path]:
-    """Return the files of the learned targets that come with the package, by name."""
-    return {path.stem: path for path in sorted(SHIPPED_TARGETS.glob("*.safetensors"))}
+    return (*(name for name in TARGET_MOTIONS if name != AGENT), *OPEN_LOOP, *shipped(SHIPPED_TARGETS))
 
 
 def load(policy: str | Path) -> Policy:
@@ -98,7 +93,7 @@ def load(policy: str | Path) -> Policy:
     text = str(policy)
     if text in SCRIPTED:
         return SCRIPTED[text]()
-    found = _found("policy", text, shipped(), _FILES, [name for name in policy_names() if name not in ABLATIONS])
+    found = _found("policy", text, shipped(), FILES, [name for name in policy_names() if name not in ABLATIONS])
     if getattr(found, "side", "trackers") == "target":
         raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
     if not isinstance(found, Policy):
@@ -128,7 +123,7 @@ def load_target(target: str | Path | Target) -> Target:
     if text in OPEN_LOOP:
         return Target(text, AGENT, OPEN_LOOP[text])
     readers = {".safetensors": LearnedPolicy.from_file}
-    found = _found("target", text, shipped_targets(), readers, target_names())
+    found = _found("target", text, shipped(SHIPPED_TARGETS), readers, target_names())
     if getattr(found, "side", "target") != "target":
         raise PolicyError(f"{text!r} is the policy of a team, {found.name!r}, not of a target")
     missing = [name for name in ("begin", "act", "restart") if not callable(getattr(found, name, None))]
@@ -159,14 +154,9 @@ def _found(
     raise PolicyError(f'{unknown(kind, text, names)}, a file, or "package.module:Class"')
 
 
-def ships_or_is_file(policy: Any) -> bool:
-    """Return whether this is the name of a shipped policy or the path of a policy file."""
-    return isinstance(policy, str) and (policy in policy_names() or Path(policy).suffix in _FILES)
-
-
 def is_code(policy: str) -> bool:
     """Return whether :func:`load` would import code: ``"package.module:Class"``."""
-    return ":" in policy and not ships_or_is_file(policy) and not is_file(policy)
+    return ":" in policy and Path(policy).suffix not in FILES and not is_file(policy)
 
 
 def is_file(path: str | Path) -> bool:

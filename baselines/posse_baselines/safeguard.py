@@ -25,8 +25,8 @@ from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.memory import minds_for
 from posse_baselines.ddcs.step import guard_all
 from posse_baselines.laws.offsets import in_units
-from posse_baselines.policy import PolicyError
-from posse_baselines.tuned import TunedDDCS
+from posse_baselines.policy import PolicyError, split_agents, stack_agents
+from posse_baselines.tuned import tuned_settings
 
 
 class Guard(OwnArrays):
@@ -36,18 +36,23 @@ class Guard(OwnArrays):
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
+
+    Attributes:
+        inputs: (E, R, 0): what a network reads of it, nothing; as of :class:`posse_baselines.learned.advice.Advice`.
     """
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         self._layout, scenario = layout, layout.scenario
         robots = scenario.num_trackers if robots is None else robots
-        settings = TunedDDCS("ddcs-tuned").settings_for(scenario)
+        settings = tuned_settings("ddcs-tuned", scenario)
         self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
+        self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 
-    def follow(self, observations: FloatArray) -> None:
-        """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
-        self._observed[...] = in_units(self._layout, observations)
+    def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
+        """Take the observations (E, R, F) of a control step, in the worlds of a mask (E,) or in all."""
+        worlds = ... if mask is None else mask
+        self._observed[worlds] = in_units(self._layout, observations)[worlds]
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
@@ -126,23 +131,17 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
         super().__init__(env)
         for agent in env.possible_agents:
             _check_continuous(env.action_space(agent))
-        self._trackers = [agent for agent in env.possible_agents if agent.startswith("tracker_")]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
         observations, infos = self.env.reset(seed=seed, options=options)
         self._guard = Guard(self.env.unwrapped.layout, 1)
-        self._observe(observations)
+        self._guard.follow(stack_agents(observations))
         return observations, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        wanted = np.stack([np.asarray(actions[agent], np.float32) for agent in self._trackers])
-        motions = self._guard.actions(wanted[None])[0]
-        guarded = {**actions, **dict(zip(self._trackers, motions, strict=True))}
-        result: tuple[Any, Any, Any, Any, Any] = self.env.step(guarded)
-        self._observe(result[0])
+        motions = self._guard.actions(stack_agents(actions))
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **split_agents(motions, actions)})
+        self._guard.follow(stack_agents(result[0]))
         return result
-
-    def _observe(self, observations: Mapping[str, Any]) -> None:
-        self._guard.follow(np.stack([observations[agent] for agent in self._trackers])[None])

@@ -7,8 +7,8 @@ from typing import Any
 
 import gymnasium
 
-from posse import Batch, PairedBatch, Scenario, ScenarioError, get_scenario
-from posse.adapters.gymnasium_env import TeamEnv
+from posse import Batch, PairedBatch, Scenario, ScenarioError
+from posse.adapters.gymnasium_env import TeamEnv, team_scenario
 from posse.adapters.vector_env import TeamVectorEnv
 from posse_baselines.policy import Policy
 from posse_baselines.registry import load
@@ -71,12 +71,7 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
 
 def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario with messages as long as the team-mates need."""
-    found = get_scenario(scenario, **overrides)
-    if found.target_motion == "agent":
-        raise ScenarioError(
-            "target_motion='agent' is not possible in posse/Tracker-v0, whose agent is a tracker: "
-            "use posse.parallel_env(..., target_motion='agent')"
-        )
+    found = team_scenario(scenario, **overrides)
     if found.num_trackers < 2:
         raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")
     if number not in range(found.num_trackers):

@@ -39,30 +39,29 @@ class TunedDDCS(DDCS):
         super().__init__(FAMILY[TUNED[name]], name)
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return the settings tuned for a scenario, or the untuned ones.
-
-        Raises:
-            PolicyError: The file of the settings is damaged.
-        """
-        path = tuned_files(self.name).get(scenario.name)
-        return self.settings if path is None else read_tuned(path).settings
+        """Return :func:`tuned_settings`."""
+        return tuned_settings(self.name, scenario)
 
 
 class TunedFile(DDCS):
     """A DDCS policy that plays the settings of one file on every scenario.
 
     Attributes:
-        policy: Name of the policy whose settings were tuned.
-        scenario: Name of the scenario that they were tuned for.
-        settings: All settings of the tuned policy.
-        card: Everything that the file says.
+        card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
+            tuned for, and more.
     """
 
     trained_splits = ("train",)
 
-    def __init__(self, settings: Settings, policy: str, scenario: str, card: Mapping[str, Any]) -> None:
-        super().__init__(settings, f"{policy}-tuned-{scenario}")
-        self.policy, self.scenario, self.card = policy, scenario, card
+    def __init__(self, settings: Settings, card: Mapping[str, Any]) -> None:
+        super().__init__(settings, f"{card['policy']}-tuned-{card['scenario']}")
+        self.card = card
+
+
+def tuned_settings(name: str, scenario: Scenario) -> Settings:
+    """Return the settings of a tuned policy, one of :data:`TUNED`, on a scenario: the untuned ones where no file is."""
+    path = tuned_files(name).get(scenario.name)
+    return FAMILY[TUNED[name]] if path is None else read_tuned(path).settings
 
 
 def tuned_files(name: str) -> dict[str, Path]:
@@ -103,4 +102,4 @@ def read_tuned(path: Path) -> TunedFile:
         settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
     except (TypeError, ValueError, OverflowError) as error:
         raise PolicyError(f"{path} has impossible settings: {error}") from error
-    return TunedFile(settings, policy, scenario, card)
+    return TunedFile(settings, card)

@@ -192,7 +192,7 @@ def test_a_policy_with_more_to_say_than_messages_hold_is_refused() -> None:
         load("ddcs-distributed").begin(posse.batch("constant", message_size=2).layout, 1)
 
 
-@pytest.mark.parametrize("name", ["pursuit", "ddcs-distributed"])
+@pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])
 def test_observations_of_another_shape_are_refused(name: str) -> None:
     policy = load(name)
     batch = batch_for(policy, "constant", 3)

@@ -36,12 +36,11 @@ def test_what_ships() -> None:
 
 @pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
 def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
-    found = read_tuned(path)
-    card = found.card
-    assert found.policy == TUNED[name]
-    assert found.scenario == path.stem
+    card = read_tuned(path).card
+    assert card["policy"] == TUNED[name]
+    assert card["scenario"] == path.stem
     assert card["scenario_version"] == posse.get_scenario(path.stem).version
-    assert card["command"].startswith(f"posse tune {found.policy} --scenario {path.stem} --gener")
+    assert card["command"].startswith(f"posse tune {card['policy']} --scenario {path.stem} --gener")
     assert card["command"].endswith(" ".join(["--only", *card["searched"]]))
     assert card["commit"]
     assert card["trained_splits"] == ["train"]

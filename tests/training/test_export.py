@@ -18,7 +18,7 @@ from posse_baselines import load
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
-from posse_baselines.registry import shipped, shipped_targets
+from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_baselines.safeguard import Guard
 from posse_training.cli import main
 from posse_training.commands.export import export
@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
 HERE = importlib.util.find_spec("onnxruntime") is not None
 needs_onnx = pytest.mark.skipif(not HERE, reason="run elsewhere, by the test that says so")
-SHIPPED = shipped() | shipped_targets()
+SHIPPED = shipped() | shipped(SHIPPED_TARGETS)
 
 
 @pytest.mark.long

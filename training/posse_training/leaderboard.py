@@ -20,7 +20,7 @@ import tyro
 from posse import get_scenario, scenario_names
 from posse_baselines import Policy, load, policy_names
 from posse_baselines.files import write_atomically
-from posse_baselines.registry import is_code, ships_or_is_file
+from posse_baselines.registry import FILES, is_code
 from posse_training.errors import ResultFileError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
@@ -212,7 +212,7 @@ def verify(
         raise ResultFileError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
     if ":" in text and not run_code:
         raise ResultFileError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
-    if ":" not in text and not ships_or_is_file(text):
+    if ":" not in text and text not in policy_names() and Path(text).suffix not in FILES:
         raise ResultFileError(f"{path}: policy={text!r} is neither shipped nor a policy file beside it, nor code")
     policy = load(text if ":" in text or text in policy_names() else str(folder / text))
     drawn = secrets.randbelow(2**31) if seed is None else seed

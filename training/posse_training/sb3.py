@@ -25,10 +25,10 @@ from posse_baselines.policy import BasePolicy, check_fits, check_observations  #
 from posse_baselines.safeguard import Guard  # noqa: E402
 from posse_training.train.vec_env import TeamVecEnv  # noqa: E402
 
-__all__ = ["ModelPolicy", "TeamVecEnv", "from_sb3"]
+__all__ = ["TeamVecEnv", "from_sb3"]
 
 
-class ModelPolicy(BasePolicy):
+class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     """A policy that plays what a stable-baselines3 model has learned.
 
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
@@ -126,7 +126,3 @@ class ModelPolicy(BasePolicy):
             guard.follow(observations)
             actions = guard.actions(actions)
         return actions, (layout, worlds, encoder, guard, states, np.zeros_like(begins))
-
-
-from_sb3 = ModelPolicy
-"""Makes a policy of a model."""

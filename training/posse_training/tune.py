@@ -25,11 +25,11 @@ from posse import Family, Scenario
 from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, Tunable, load
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.fields import number, optional, tunables
+from posse_baselines.fields import number, tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import CheckpointError, SettingsError, check_settings, require
-from posse_training.evaluation.episodes import play_shard
+from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import hold_settings, locked, read_json
@@ -68,7 +68,7 @@ class TuneSettings:
     """Seed of the search and of the worlds."""
     out: Path | None = None
     """Run folder; default: runs/tune/POLICY-SCENARIO-SEED. A run that it holds is resumed."""
-    generations: int | None = optional(1, 1_000_000, whole=True)
+    generations: int | None = number(None, "", 1, 1_000_000)
     """Stop after so many generations, whatever the time."""
     population: int = number(12, "", 4, 1_000)
     """Candidates in a generation."""
@@ -80,7 +80,7 @@ class TuneSettings:
     """Generations between two of these scores."""
     only: tuple[str, ...] = ()
     """Settings to search over; default: all that have an effect on this scenario."""
-    threads: int | None = optional(1, 1_024, whole=True)
+    threads: int | None = number(None, "", 1, 1_024)
     """Threads that step the worlds; default: as many as cores. Never changes the result."""
     ray: Ray = False
     """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of this machine, or
@@ -277,9 +277,8 @@ class _Run:
         s = self.settings
         threads = s.threads if s.ray is False else 1
         seed, split, indices = worlds
-        calls = [
-            (self.policy.with_settings(**values), None, self.scenario, seed, split, indices) for values in candidates
-        ]
+        teams = [self.policy.with_settings(**values) for values in candidates]
+        calls = [(Match(team, None, self.scenario, seed, split), indices) for team in teams]
         play = partial(play_shard, num_threads=threads)
         if s.ray is False:
             return [play(*call) for call in calls]

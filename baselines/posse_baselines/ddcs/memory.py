@@ -40,7 +40,7 @@ _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
 MOST_WAITING: Final = 10
 """A delay of more control steps than this is not foreseen."""
-_UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
+UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
 class Team(NamedTuple):
@@ -254,7 +254,7 @@ def read_body(team: Team, me: Record, row: FloatArray) -> None:
     me.position, me.heading = pair(row, at.position), pair(row, at.heading)
     me.speed, me.omega = row[at.speed], row[at.turn_rate]
     me.max_speed, me.max_omega = row[at.max_speed], row[at.max_turn_rate]
-    me.acceleration, me.turn_acceleration = _UNLIMITED, _UNLIMITED
+    me.acceleration, me.turn_acceleration = UNLIMITED, UNLIMITED
     if row[at.acceleration_time] > 0.0:
         me.acceleration = row[at.max_speed] / row[at.acceleration_time]
     if row[at.turn_acceleration_time] > 0.0:

@@ -50,7 +50,7 @@ class Settings:
     deviation: str = choice("slot", DEVIATIONS)
     """c of PNGL: ``"none"`` (0, as in (5)), ``"slot"`` (ψ - K σ_d) or ``"occupant"`` (the heading
     of the slot's occupant, which differs from ψ while the frame turns, - K σ_d)."""
-    navigation_constant: float = number(1.0, "", 0.9, 1.1, tune=True)
+    navigation_constant: float = tuned(1.0, "", 0.9, 1.1)
     """K of PNGL: of the leader, and the mean of a distributed team."""
     spread: float = number(0.0, "", 0.0, 0.1)
     """By how much K differs from the mean at both ends of a distributed team, η in the paper."""

@@ -4,18 +4,20 @@ They contain nothing that the observation lacks; a network could learn them, but
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
 slots to trackers.
 
-All vectors are relative to the tracker: x ahead, y to the left. A length d is scaled to
-d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
+All vectors are relative to the tracker: x ahead, y to the left (:mod:`posse_baselines.laws.geometry`). A length d is
+scaled to d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, FloatArray, Record, compiled
+from posse.numeric import ONE, FloatArray, Record, compiled, record_type
+from posse_baselines.ddcs.memory import pair
+from posse_baselines.laws.geometry import angle_of, length, scaled
 
 _SMALL: Final = np.float32(1e-6)
 _LARGE: Final = np.float32(1e9)
@@ -26,171 +28,168 @@ _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _BIT: Final = np.uint64(1)
 
-_MOST: Final = 16
+MOST: Final = 16
 """Robots in a matching at most: the own one and the nearest ones that it knows of."""
 _MATES: Final = 3
-_OWN: Final = 2 + 4 * _MATES
-"""Features before those of the target, which are zeros while it is unknown."""
-NUM_FEATURES: Final = _OWN + 23
+_F, _C = np.float32, np.complex64
 
+FEATURES: Final = record_type(
+    ("speed", _F),  # share of the greatest
+    ("turn_rate", _F),  # share of the greatest
+    ("mates", _C, (_MATES, 2)),  # of the nearest ones: the position / (d + 1 m), the velocity less the own one, m/s
+    # zeros while the target is unknown:
+    ("slot_near", _C),  # the way to the own slot / (d + 0.3 m)
+    ("slot_far", _C),  # the same / (d + 3 m)
+    ("slot_away", _F),  # its length / (d + 1 m)
+    ("target", _C),  # the way to the target / (d + 1 m)
+    ("target_heading", _C),  # in the slot frame
+    ("target_velocity", _C),  # m/s
+    ("frame", _C),  # direction of the slot frame
+    ("slot", _C),  # from the target in the slot frame / (d + 3 m)
+    ("law_speed", _F),  # of the velocity that the slot law wants, as a share of the greatest
+    ("law_direction", _C),
+    ("law_turn", _F),  # turn rate towards it, share of the greatest
+    ("held", _F),  # share of the known team-mates that are in their slots
+    ("seen", _F),  # 1: the tracker itself detects the target
+    ("age", _F),  # of the fix / (t + 1 s)
+    ("known", _F),  # 1
+)
+"""The features of one observation, float32 numbers in this order."""
+NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 
-def scratch_for(num_slots: int) -> tuple[int, int]:
-    """Return the shape of the array that :func:`write_features` works in."""
-    return 4 + num_slots, _MOST
+TEAM: Final = record_type(
+    ("count", np.int64),
+    ("places", _C, (MOST,)),  # m
+    ("numbers", np.int64, (MOST,)),
+    ("slots", np.int64, (MOST,)),  # -1: none left
+)
+"""The robots that a tracker knows of, itself among them, as :func:`write_features` works with them."""
 
 
 @compiled
-def write_features(row: FloatArray, f: Record, slots: FloatArray, scratch: FloatArray, out: FloatArray) -> None:
-    """Write the features of one observation (F,) to ``out`` (NUM_FEATURES,).
+def write_features(
+    row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], team: Record, ways: FloatArray, out: Record
+) -> None:
+    """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
 
-    ``f`` has the offsets of the observation's fields, ``slots`` (N, 2) are in the slot frame.
+    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame; it works in ``team``, a
+    :data:`TEAM`, and ``ways`` (N, MOST).
     """
-    for k in range(NUM_FEATURES):
-        out[k] = ZERO
-    xs, ys, numbers, chosen, ways = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4:]
-    count = _gather_team(row, f, xs, ys, numbers)
+    _gather_team(row, f, team)
     top, speed = row[f.max_speed], row[f.speed]
-    out[0] = speed / top
-    out[1] = row[f.turn_rate] / row[f.max_turn_rate]
-    for m in range(min(count - 1, _MATES)):  # each mate's position and velocity
+    out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
+    for m in range(min(team.count - 1, _MATES)):
         place = m * f.stride
-        heading, mate_speed = f.neighbour_heading + place, row[f.neighbour_speed + place]
-        _soft(xs[m + 1], ys[m + 1], ONE, out[2 + 4 * m : 4 + 4 * m])
-        out[4 + 4 * m] = mate_speed * row[heading] - speed
-        out[5 + 4 * m] = mate_speed * row[heading + 1]
-    if row[f.target_known] == ZERO:
+        out.mates[m, 0] = _soft(team.places[m + 1], ONE)
+        out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
+    if row[f.target_known] == 0.0:
         return
-    o = out[_OWN:]
-    vx, vy = row[f.target_velocity], row[f.target_velocity + 1]
-    age = min(row[f.target_age], _OLDEST)
-    x = row[f.target_range] * row[f.target_bearing] + vx * age
-    y = row[f.target_range] * row[f.target_bearing + 1] + vy * age
-    c, n = row[f.target_frame], row[f.target_frame + 1]
-    hx, hy = row[f.target_heading], row[f.target_heading + 1]
-    me = _sort_by_number(count, xs, ys, numbers)
+    velocity, frame = pair(row, f.target_velocity), pair(row, f.target_frame)
+    target = scaled(pair(row, f.target_bearing), row[f.target_range])
+    target += scaled(velocity, min(row[f.target_age], _OLDEST))
+    me = _sort_by_number(team)
     for s in range(len(slots)):
-        sx, sy = _slot(slots[s], x, y, c, n)
-        for j in range(count):
-            wx, wy = xs[j] - sx, ys[j] - sy
-            ways[s, j] = np.float32(math.sqrt(wx * wx + wy * wy))
-    match_slots(count, len(slots), ways, chosen)
-    mine = max(int(chosen[me]), 0)
-    dx, dy = _slot(slots[mine], x, y, c, n)
-    d = np.float32(math.sqrt(dx * dx + dy * dy))
-    _soft(dx, dy, _NEAR, o[0:2])  # the way to the own slot
-    _soft(dx, dy, _FAR, o[2:4])
-    o[4] = d / (d + ONE)
-    _soft(x, y, ONE, o[5:7])  # the target
-    o[7] = hx * c + hy * n  # its heading in the slot frame
-    o[8] = hy * c - hx * n
-    o[9], o[10] = vx, vy
-    o[11], o[12] = c, n
-    _soft(slots[mine, 0], slots[mine, 1], _FAR, o[13:15])
+        place = _place_of(slots[s], target, frame)
+        for j in range(team.count):
+            ways[s, j] = length(team.places[j] - place)
+    match_slots(team.count, len(slots), ways, team.slots)
+    slot = slots[max(team.slots[me], 0)]
+    way = _place_of(slot, target, frame)
+    d = length(way)
+    out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + ONE)
+    out.target, out.target_velocity, out.frame, out.slot = _soft(target, ONE), velocity, frame, _soft(slot, _FAR)
+    out.target_heading = pair(row, f.target_heading) * frame.conjugate()
     # The slot law: the slot's velocity plus a velocity towards it, proportional to the distance.
-    wx, wy = vx + _GAIN * dx, vy + _GAIN * dy
-    wanted = np.float32(math.sqrt(wx * wx + wy * wy))
-    error = np.float32(math.atan2(wy, wx))
-    o[15] = min(wanted / top, ONE)
-    o[16] = wx / (wanted + _SMALL)
-    o[17] = wy / (wanted + _SMALL)
-    o[18] = max(-ONE, min(ONE, _TURN_GAIN * error / row[f.max_turn_rate]))
+    wish = velocity + complex(_GAIN * way.real, _GAIN * way.imag)
+    wanted = length(wish)
+    out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
+    out.law_turn = max(-ONE, min(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], ONE))
     held = 0
-    for j in range(count):
-        s = int(chosen[j])
+    for j in range(team.count):
+        s = team.slots[j]
         if s >= 0 and j != me:
             held += ways[s, j] < _NEAR
-    o[19] = np.float32(held) / np.float32(max(count - 1, 1))  # share of the mates in their slots
-    o[20] = row[f.target_seen]
-    o[21] = row[f.target_age] / (row[f.target_age] + ONE)
-    o[22] = ONE
+    out.held = held / max(team.count - 1, 1)
+    out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
 
 
 @compiled
-def _soft(x: np.float32, y: np.float32, scale: np.float32, out: FloatArray) -> None:
-    """Write (x, y) with its length d replaced by d / (d + scale)."""
-    d = np.float32(math.sqrt(x * x + y * y))
-    out[0] = x / (d + scale)
-    out[1] = y / (d + scale)
+def _soft(v: complex, scale: np.float32) -> complex:
+    """Return a vector whose length d is scaled to d / (d + scale)."""
+    far = length(v) + scale
+    return complex(v.real / far, v.imag / far)
 
 
 @compiled
-def _slot(
-    slot: FloatArray, x: np.float32, y: np.float32, c: np.float32, n: np.float32
-) -> tuple[np.float32, np.float32]:
-    """Return where a slot of a target at (x, y) is; (c, n) is the direction of the slot frame."""
-    return np.float32(x + slot[0] * c - slot[1] * n), np.float32(y + slot[0] * n + slot[1] * c)
+def _place_of(slot: complex, target: complex, frame: complex) -> complex:
+    """Return where a slot of a target is; rounded in this order, as networks learned to read it."""
+    x, y = target.real + slot.real * frame.real, target.imag + slot.real * frame.imag
+    return complex(x - slot.imag * frame.imag, y + slot.imag * frame.real)
 
 
 @compiled
-def _gather_team(row: FloatArray, f: Record, xs: FloatArray, ys: FloatArray, numbers: FloatArray) -> int:
-    """Write the present positions of the known team, own robot first; return their number."""
-    xs[0], ys[0], numbers[0] = ZERO, ZERO, row[f.number]
-    count = 1
+def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
+    """Write the present positions of the known team, own robot first."""
+    team.places[0], team.numbers[0], team.count = 0j, int(row[f.number]), 1
     for p in range(f.neighbours):
         place = p * f.stride
-        number = row[f.neighbour_number + place]
-        if number < ZERO or count >= _MOST:
-            continue
-        length, bearing = row[f.neighbour_range + place], f.neighbour_bearing + place
-        heading = f.neighbour_heading + place
-        reach = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], _OLDEST)
-        xs[count] = length * row[bearing] + row[heading] * reach
-        ys[count] = length * row[bearing + 1] + row[heading + 1] * reach
-        numbers[count] = number
-        count += 1
-    return count
+        number = int(row[f.neighbour_number + place])
+        if number >= 0 and team.count < MOST:
+            run = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], _OLDEST)
+            way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
+            team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
+            team.numbers[team.count] = number
+            team.count += 1
 
 
 @compiled
-def _sort_by_number(count: int, xs: FloatArray, ys: FloatArray, numbers: FloatArray) -> int:
+def _sort_by_number(team: Record) -> int:
     """Sort robots by number, so that all trackers match alike; return the own robot's index."""
-    me = numbers[0]
-    for i in range(1, count):
-        x, y, number = xs[i], ys[i], numbers[i]
+    me = 0
+    for i in range(1, team.count):
+        place, number = team.places[i], team.numbers[i]
         j = i
-        while j > 0 and numbers[j - 1] > number:
-            xs[j], ys[j], numbers[j] = xs[j - 1], ys[j - 1], numbers[j - 1]
+        while j > 0 and team.numbers[j - 1] > number:
+            team.places[j], team.numbers[j] = team.places[j - 1], team.numbers[j - 1]
             j -= 1
-        xs[j], ys[j], numbers[j] = x, y, number
-    for i in range(count):
-        if numbers[i] == me:
-            return i
-    return 0
+        team.places[j], team.numbers[j] = place, number
+        me += j <= me
+    return me
 
 
 @compiled
-def match_slots(count: int, num_slots: int, ways: FloatArray, chosen: FloatArray) -> None:
+def match_slots(count: int, num_slots: int, ways: FloatArray, chosen: npt.NDArray[np.int64]) -> None:
     """Match ``count`` robots to slots; write each robot's slot to ``chosen``, -1 for none left.
 
     Greedy by distance, then pairwise swaps while one shortens the total distance. Trackers that
     know of the same robots get the same result. ``ways[s, j]`` is the distance of robot j from slot s, m.
     """
     for j in range(count):
-        chosen[j] = -ONE
+        chosen[j] = -1
     taken = np.uint64(0)
     for _ in range(min(count, num_slots)):
         best, robot, slot = _LARGE, -1, -1
         for j in range(count):
-            if chosen[j] >= ZERO:
+            if chosen[j] >= 0:
                 continue
             for s in range(num_slots):
                 if ways[s, j] < best and (taken >> np.uint64(s)) & _BIT == np.uint64(0):
                     best, robot, slot = ways[s, j], j, s
         if robot < 0:
             break
-        chosen[robot] = np.float32(slot)
+        chosen[robot] = slot
         taken |= _BIT << np.uint64(slot)
     for _ in range(count):
         swapped = False
         for i in range(1, count):
             for j in range(i):
-                a, b = int(chosen[i]), int(chosen[j])
+                a, b = chosen[i], chosen[j]
                 if a < 0 or b < 0:
                     continue
                 now = ways[a, i] + ways[b, j]
                 then = ways[b, i] + ways[a, j]
                 if then < now - _SMALL * now:
-                    chosen[i], chosen[j] = np.float32(b), np.float32(a)
+                    chosen[i], chosen[j] = b, a
                     swapped = True
         if not swapped:
             break

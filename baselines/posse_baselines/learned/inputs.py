@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.laws.offsets import offsets_of
-from posse_baselines.learned.features import NUM_FEATURES, scratch_for, write_features
+from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, TEAM, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots", "belief")
@@ -30,8 +30,7 @@ MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
 
-@dataclass(frozen=True)
-class EncodedField:
+class EncodedField(NamedTuple):
     """One field that a network reads; ``unknown`` replaces it where it is missing."""
 
     name: str
@@ -104,7 +103,7 @@ class Encoding:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the encoding as plain values."""
-        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(astuple(f)) for f in self.fields]}
+        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(f) for f in self.fields]}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
@@ -174,9 +173,11 @@ class _Tables(NamedTuple):
     unknown: FloatArray
     offsets: Records
     """(1,) of the fields in the observation."""
-    slots: FloatArray
-    """(N, 2) positions in the slot frame, m."""
-    num_features: int
+    slots: npt.NDArray[np.complex64]
+    """(N,) positions in the slot frame, m."""
+    teams: Records
+    """What the features are computed in, one a thread."""
+    ways: FloatArray
 
 
 class Encoder(OwnArrays):
@@ -188,29 +189,32 @@ class Encoder(OwnArrays):
 
     def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
         self.encoding = encoding
-        slots = np.array(layout.scenario.slot_offsets, np.float32)
-        num_features = NUM_FEATURES if encoding.with_features else 0
-        self._tables = _Tables(*encoding.columns(layout), offsets_of(layout), slots, num_features)
-        self._scratch = np.empty((MOST_THREADS, *scratch_for(len(slots))), np.float32)
+        slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
+        work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
+        self._tables = _Tables(*encoding.columns(layout), offsets_of(layout), slots, *work)
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
+        features = np.zeros(len(rows) if self.encoding.with_features else 0, FEATURES)
         # The threads share out rows as if each were a world of one tracker.
-        over_worlds(_encode_rows, (rows, self._tables, self._scratch, out), len(rows), 1)
+        over_worlds(_encode_rows, (rows, self._tables, features, out), len(rows), 1)
+        if self.encoding.with_features:
+            out[:, :NUM_FEATURES] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)
         return out
 
 
 @kernel
 def _encode_rows(
-    rows: FloatArray, tables: _Tables, scratch: FloatArray, out: FloatArray, thread: int, first: int, end: int
+    rows: FloatArray, tables: _Tables, features: Records, out: FloatArray, thread: int, first: int, end: int
 ) -> None:
-    n = tables.num_features
+    n = out.shape[1] - len(tables.columns)
     for r in range(first, end):
-        if n:
-            write_features(rows[r], tables.offsets[0], tables.slots, scratch[thread], out[r, :n])
+        if len(features):
+            at, slots, team, ways = tables.offsets[0], tables.slots, tables.teams[thread], tables.ways[thread]
+            write_features(rows[r], at, slots, team, ways, features[r])
         for k in range(len(tables.columns)):
             c = tables.columns[k]
             out[r, n + k] = rows[r, c] if c >= 0 else tables.unknown[k]

@@ -22,7 +22,7 @@ from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.files import write_atomically
-from posse_baselines.learned.advice import MOTION, Advising
+from posse_baselines.learned.advice import MOTION, Advice, check_adviser
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
@@ -43,8 +43,8 @@ class _Memory(NamedTuple):
     num_worlds: int
     robots: int
     encoder: Encoder
-    adviser: Memory
-    guard: Guard | None
+    layer: Advice | Guard | None
+    """What makes the robots' actions of the network's."""
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -75,10 +75,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Policy | None = None,
         safeguard: bool = False,
     ) -> None:
-        if adviser is None and encoding.believes:
-            raise PolicyError("a policy that reads an adviser's belief needs an adviser")
-        self._advising = None if adviser is None else Advising(adviser, believes=encoding.believes)
-        size = encoding.size + (0 if self._advising is None else self._advising.inputs)
+        size = encoding.size + check_adviser(adviser, believes=encoding.believes)
         if network.inputs != size:
             raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
         if network.outputs < MOTION:
@@ -129,9 +126,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """
         super().begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        guard = Guard(layout, num_worlds) if self.safeguard else None
-        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), adviser_memory, guard)
+        layer: Advice | Guard | None = Guard(layout, num_worlds) if self.safeguard else None
+        if self.adviser is not None:
+            layer = Advice(self.adviser, layout, num_worlds, believes=self.encoding.believes)
+        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), layer)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -140,39 +138,28 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """
         m: _Memory = memory
         observations = check_observations(self, observations, m.num_worlds, m.layout, m.robots)
-        team = observations.shape[:2]
-        if self._advising is None:
-            outputs = forward(self._flat, m.encoder.encode(observations))
-            actions = np.zeros((*team, MOTION + m.layout.scenario.message_size), np.float32)
-            actions[..., : outputs.shape[1]] = outputs.reshape(*team, -1)
-            if m.guard is not None:
-                m.guard.follow(observations)
-                actions = m.guard.actions(actions)
-            return actions, m
-        further, advised = self._advising.ask(observations, m.adviser)
-        inputs = np.concatenate([m.encoder.encode(observations), further.reshape(-1, further.shape[-1])], axis=1)
-        corrections = forward(self._flat, inputs).reshape(*team, MOTION)
-        actions, advised = self._advising.answer(observations, corrections, advised)
-        return actions, m._replace(adviser=advised)
+        inputs = m.encoder.encode(observations)
+        if m.layer is not None:
+            m.layer.follow(observations)
+            inputs = np.concatenate([inputs, m.layer.inputs.reshape(len(inputs), -1)], axis=1)
+        outputs = forward(self._flat, inputs).reshape(*observations.shape[:2], -1)
+        actions = np.zeros((*outputs.shape[:2], MOTION + m.layout.scenario.message_size), np.float32)
+        actions[..., : outputs.shape[2]] = outputs
+        return actions if m.layer is None else m.layer.actions(actions), m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with adviser and safeguard restarted in the worlds of a mask (E,)."""
-        if memory.guard is not None:
-            memory.guard.restart(mask)
-        if self.adviser is None:
-            return memory
-        return memory._replace(adviser=self.adviser.restart(memory.adviser, mask))
+        if memory.layer is not None:
+            memory.layer.restart(mask)
+        return memory
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the memory of adviser or safeguard as arrays by name; views, not copies."""
-        if memory.guard is not None:
-            found: dict[str, npt.NDArray[Any]] = memory.guard.arrays()
-            return found
-        return {} if self._advising is None else self._advising.adviser.arrays(memory.adviser)
+        return {} if memory.layer is None else dict(memory.layer.arrays())
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
-        return {} if self.adviser is None else self.adviser.annotations(memory.adviser)
+        return {} if self.adviser is None else self.adviser.annotations(memory.layer.memory)
 
     def description(self) -> dict[str, Any]:
         """Return what its file says beside the tensors, as plain values."""

@@ -15,16 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
 from posse_baselines.laws.offsets import unit_of
-from posse_baselines.policies.planner.policy import PlannerSettings, Search
+from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
 from posse_baselines.policy import Annotations, Memory, check_observations
-from posse_baselines.tuned import TunedDDCS
+from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
@@ -37,14 +37,12 @@ _APART: Final = 10  # control steps between two turn rates from which a weave is
 _USUAL: Final = math.cos(0.5 * 0.1 * _APART)  # of a weave of 0.5 rad/s
 _KEPT: Final = 0.99  # share of what was learned of a weave that is kept in a step
 
-_SEEN: Final[np.dtype[Any]] = np.dtype(
-    [
-        ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
-        ("theta", np.float64),  # heading then, rad
-        ("turns", np.float64, (2 * _APART + 1,)),  # turn rates of the last steps before it, rad/s; NaN: not measured
-        ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
-        ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
-    ]
+_SEEN: Final = record_type(
+    ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
+    ("theta", np.float64),  # heading then, rad
+    ("turns", np.float64, (2 * _APART + 1,)),  # turn rates of the last steps before it, rad/s; NaN: not measured
+    ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
+    ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
 )
 
 
@@ -73,16 +71,18 @@ class BeliefSettings:
 
 
 class _Told(NamedTuple):
-    """What the trackers of R belief worlds were told of one moment."""
+    """What the trackers of R belief worlds were told of W moments, oldest first, and what was done then."""
 
     heard: BoolArray
-    """(R, N) whose pose is known."""
+    """(W, R, N) whose pose is known."""
     robots: FloatArray
-    """(R, N, 6) by :data:`_ROBOT`, in the common frame."""
+    """(W, R, N, 6) by :data:`_ROBOT`, in the common frame."""
     fixed: BoolArray
-    """(R,) whether there is a fix of the target."""
-    fix: FloatArray
-    """(R, 8) its position, heading, slot frame and velocity, each a pair."""
+    """(W, R) whether there is a fix of the target."""
+    fix: npt.NDArray[np.complex64]
+    """(W, R, 4) its position, heading, slot frame and velocity."""
+    played: FloatArray
+    """(W, R, rows, 2 + m) the actions."""
 
 
 def believed(scenario: Scenario) -> Scenario:
@@ -131,18 +131,18 @@ class Beliefs(OwnArrays):
         """The worlds as they were at the beginning of the window, before anything was written of that moment."""
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past
         self.step, self.newest, self.age = (np.zeros(self.rows, np.int64) for _ in range(3))
-        shape = self.rows, scenario.num_trackers
-        self._told = tuple(self._nothing(*shape) for _ in range(window + 1))  # of each moment, oldest first
-        self._played = tuple(np.zeros(self.now.action_shape, np.float32) for _ in range(window + 1))
+        shape = window + 1, self.rows, scenario.num_trackers
+        self._told = _Told(
+            np.zeros(shape, np.bool_),
+            np.zeros((*shape, len(_ROBOT)), np.float32),
+            np.zeros(shape[:2], np.bool_),
+            np.zeros((*shape[:2], 4), np.complex64),
+            np.zeros((window + 1, *self.now.action_shape), np.float32),
+        )
         self.search = Search(settings.plan, self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
         self.search.teams.late[:] = settings.unseen_delay * (np.array(arms) > scenario.sensing_range)
         self.restart(np.ones(self.rows, np.bool_))
-
-    @staticmethod
-    def _nothing(rows: int, n: int) -> _Told:
-        heard, robots = np.zeros((rows, n), np.bool_), np.zeros((rows, n, len(_ROBOT)), np.float32)
-        return _Told(heard, robots, np.zeros(rows, np.bool_), np.zeros((rows, 8), np.float32))
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the rows of a mask (R,)."""
@@ -151,8 +151,7 @@ class Beliefs(OwnArrays):
         limit = self.now.scenario.target_turn_rate**2
         self._seen[mask] = (-NEVER, 0.0, np.full(2 * _APART + 1, np.nan), _USUAL * limit, limit)
         self.step[mask], self.newest[mask], self.age[mask] = 0, -1, NEVER
-        for told in self._told:
-            told.heard[mask], told.fixed[mask] = False, False
+        self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
 
     def act(self, observations: FloatArray, working: BoolArray) -> FloatArray:
@@ -163,55 +162,48 @@ class Beliefs(OwnArrays):
         now, worlds = self.now, self.now.arrays
         worlds.write(self._past)
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
-        self._advance(self._seen, self._told[0], self._played[0])
+        self._advance(self._seen, 0)
         self._past.write(worlds)
-        self._told = (*self._told[1:], self._nothing(*working.shape))
+        for array in self._told:
+            array[:-1], array[-1] = array[1:], 0
         own = self._listen(observations)
-        seen = self._seen.copy()
-        for told, played in zip(self._told[:-1], self._played[1:], strict=True):
-            self._advance(seen, told, played)
-        self._write(seen, self._told[-1])
+        seen, present = self._seen.copy(), len(self._told.fixed) - 1
+        for moment in range(present):
+            self._advance(seen, moment)
+        self._write(seen, present)
         worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
         planned = self.search.actions()
-        actions = np.zeros(now.action_shape, np.float32)
+        actions = actions_of_target(now)
         actions[:, : planned.shape[1]] = planned
-        if actions.shape[1] > planned.shape[1]:  # a target that is an agent goes on as it moves now
-            scenario: Any = now.scenario
-            actions[:, -1, 0] = np.clip(2.0 * worlds.world["speed"] / scenario.target_speed - 1.0, -1.0, 1.0)
-            actions[:, -1, 1] = np.clip(worlds.world["turn_rate"] / scenario.target_turn_rate, -1.0, 1.0)
-        self._played = (*self._played[1:], actions)
+        self._told.played[-1] = actions
         self.step += 1
         return actions[np.arange(self.rows), own, :2]
 
-    def _advance(self, seen: Records, told: _Told, played: FloatArray) -> None:
+    def _advance(self, seen: Records, moment: int) -> None:
         """Write what was told of a moment, and step the worlds from there."""
-        self._write(seen, told)
+        self._write(seen, moment)
         self.now.arrays.world["over"] = 0
-        self.now.step(played)
+        self.now.step(self._told.played[moment])
 
     def _listen(self, observations: FloatArray) -> npt.NDArray[np.int64]:
         """Sort what observations (E, N, F) say by its moments; return each tracker's number, (R,)."""
         views = self.layout.views(observations)
         v = {name: view.reshape(self.rows, *view.shape[2:]) for name, view in views.items()}
-        rows, window = np.arange(self.rows), len(self._told) - 1
+        told, window = self._told, len(self._told.fixed) - 1
         heading, position = _complex(v["heading"]), _complex(v["position"])
         own = np.asarray(v["number"], np.int64)
 
-        def note(robots: Records, age: npt.NDArray[Any], number: npt.NDArray[Any], *pose: npt.NDArray[Any]) -> None:
-            for told, back in zip(self._told, range(window, -1, -1), strict=True):
-                place, which = robots[age == back], number[age == back]
-                told.heard[place, which] = True
-                told.robots[place, which] = np.stack([each[age == back] for each in pose], axis=-1)
-
-        now = np.zeros(self.rows, np.int64)
-        note(rows, now, own, position.real, position.imag, heading.real, heading.imag, v["speed"], v["turn_rate"])
-        for k in range(self.layout.neighbours):
-            number = np.asarray(v["neighbour_number"][:, k], np.int64)
-            age = np.where(number >= 0, np.rint(v["neighbour_age"][:, k] / self.dt), -1)
-            place = position + v["neighbour_range"][:, k] * _complex(v["neighbour_bearing"][:, k]) * heading
-            turned = _complex(v["neighbour_heading"][:, k]) * heading
-            motion = v["neighbour_speed"][:, k], v["neighbour_turn_rate"][:, k]
-            note(rows, age, number, place.real, place.imag, turned.real, turned.imag, *motion)
+        rows = np.arange(self.rows)
+        told.heard[-1, rows, own] = True
+        told.robots[-1, rows, own] = _poses(position, heading, v["speed"], v["turn_rate"])
+        if self.layout.neighbours:
+            age = np.where(v["neighbour_number"] >= 0, np.rint(v["neighbour_age"] / self.dt), -1)
+            place = position[:, None] + v["neighbour_range"] * _complex(v["neighbour_bearing"]) * heading[:, None]
+            turned = _complex(v["neighbour_heading"]) * heading[:, None]
+            known = np.nonzero((age >= 0) & (age <= window))
+            at = window - age[known].astype(np.int64), known[0], v["neighbour_number"][known].astype(np.int64)
+            told.heard[at] = True
+            told.robots[at] = _poses(place, turned, v["neighbour_speed"], v["neighbour_turn_rate"])[known]
         age = np.rint(v["target_age"] / self.dt)
         self.age = np.where(v["target_known"] > 0, age, NEVER)
         fresh = (v["target_known"] > 0) & (v["target_range"] >= 0) & (self.step - age > self.newest)
@@ -221,20 +213,20 @@ class Beliefs(OwnArrays):
         velocity = _complex(v["target_velocity"]) * heading
         late = np.maximum(age - window, 0.0) * self.dt
         place = place + late * self.now.scenario.target_speed * theta
-        fix = np.stack([part for each in (place, theta, frame, velocity) for part in (each.real, each.imag)], axis=-1)
-        for told, back in zip(self._told, range(window, -1, -1), strict=True):
-            here = fresh & (np.minimum(age, window) == back)
-            told.fixed[here], told.fix[here] = True, fix[here]
+        fix = np.stack([place, theta, frame, velocity], axis=-1)
+        of = window - np.minimum(age, window).astype(np.int64)[fresh], np.flatnonzero(fresh)
+        told.fixed[of], told.fix[of] = True, fix[fresh]
         return own
 
-    def _write(self, seen: Records, told: _Told) -> None:
+    def _write(self, seen: Records, moment: int) -> None:
         """Write what was told of the present moment of the worlds into them."""
         worlds, s = self.now.arrays, self.now.scenario
+        told = _Told(*(array[moment] for array in self._told))
         w = worlds.world
         for k, name in enumerate(_ROBOT):
             worlds.tracker[name][told.heard] = told.robots[told.heard, k]
         here = told.fixed
-        place, theta, frame, velocity = (_complex(told.fix[:, k : k + 2]) for k in (0, 2, 4, 6))
+        place, theta, frame, velocity = told.fix.T.astype(np.complex128)
         gap = (w["step"] - seen["step"]) * self.dt
         first = gap > self.settings.lost_after
         noise = self.layout.scenario.heading_noise
@@ -265,12 +257,11 @@ class Beliefs(OwnArrays):
             goal = np.where(first | (np.abs(surprise) > 10 * _AGREES), theta, goal * np.exp(1j * surprise))
         if s.target_motion == "accelerating":
             self._tell_weave(seen, here, gap, turn)
-        for name, value in (
-            *(("x", place.real), ("y", place.imag), ("speed", speed), ("turn_rate", turn)),
-            *(("heading_cos", theta.real), ("heading_sin", theta.imag), ("frame_cos", frame.real)),
-            *(("frame_sin", frame.imag), ("goal_cos", goal.real), ("goal_sin", goal.imag)),
-        ):
-            w[name][here] = value[here]
+        w["x"][here], w["y"][here], w["speed"][here], w["turn_rate"][here] = (
+            value[here] for value in (place.real, place.imag, speed, turn)
+        )
+        for name, direction in (("heading", theta), ("frame", frame), ("goal", goal)):
+            w[f"{name}_cos"][here], w[f"{name}_sin"][here] = direction.real[here], direction.imag[here]
         seen["step"][here], seen["theta"][here] = w["step"][here], angle[here]
 
     def _tell_weave(self, seen: Records, here: BoolArray, gap: FloatArray, turn: FloatArray) -> None:
@@ -304,6 +295,11 @@ def _complex(pairs: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
     return np.asarray(pairs[..., 0] + 1j * pairs[..., 1], np.complex128)
 
 
+def _poses(place: Any, heading: Any, speed: Any, turn_rate: Any) -> npt.NDArray[Any]:
+    """Return robots as :data:`_ROBOT` lists them, (..., 6)."""
+    return np.stack([place.real, place.imag, heading.real, heading.imag, speed, turn_rate], axis=-1)
+
+
 def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     return np.asarray(np.angle(np.exp(1j * angle)))
 
@@ -327,22 +323,20 @@ class BeliefPlanner(DDCS):
 
     def __init__(self, settings: BeliefSettings | None = None) -> None:
         super().__init__(name="belief-planner")
-        self._script = TunedDDCS("ddcs-tuned")
         self.plans = settings or BeliefSettings()
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings of ``ddcs-tuned`` for a scenario."""
-        return self._script.settings_for(scenario)
+        return tuned_settings("ddcs-tuned", scenario)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        memory = self._script.begin(layout, num_worlds)
+        memory = super().begin(layout, num_worlds)
         return _Memory(layout, memory.minds, Beliefs(self.plans, layout, num_worlds))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        if isinstance(memory, _Memory):
-            memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
+        memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
         return super().restart(memory, mask)
 
     def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
@@ -363,7 +357,7 @@ class BeliefPlanner(DDCS):
         made_up = 1.0 + minds.team.settings["foresight"][0] * (1.0 / minds.team.world["followed"][0] - 1.0)
         speed, omega = (old + (new - old) / made_up for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
-        wish = (mine["wish_x"] + 1j * mine["wish_y"]) / unit_of(memory.layout.scenario)
+        wish = mine["wish"] / unit_of(memory.layout.scenario)
         wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -59,16 +60,8 @@ class OpenLoop:
         return {"times": memory.times}
 
 
-def _left_circle(_: FloatArray) -> Shares:
-    return 1.0, 1.0
-
-
-def _right_circle(_: FloatArray) -> Shares:
-    return 1.0, -1.0
-
-
-def _wide_circle(_: FloatArray) -> Shares:
-    return 1.0, 0.5
+def _circle(turn: float, _: FloatArray) -> Shares:
+    return 1.0, turn
 
 
 def _stop_and_go(times: FloatArray) -> Shares:
@@ -83,15 +76,15 @@ def _eight(times: FloatArray) -> Shares:
     return 1.0, np.where((times // 6.0) % 2.0 > 0.0, 1.0, -1.0)
 
 
-OPEN_LOOP: Final[dict[str, OpenLoop]] = {
-    name: OpenLoop(name, motion)
-    for name, motion in {
-        "left-circle": _left_circle,
-        "right-circle": _right_circle,
-        "wide-circle": _wide_circle,
-        "stop-and-go": _stop_and_go,
-        "spiral": _spiral,
-        "eight": _eight,
-    }.items()
+OPEN_LOOP: Final = {
+    target.name: target
+    for target in (
+        OpenLoop("left-circle", partial(_circle, 1.0)),
+        OpenLoop("right-circle", partial(_circle, -1.0)),
+        OpenLoop("wide-circle", partial(_circle, 0.5)),
+        OpenLoop("stop-and-go", _stop_and_go),
+        OpenLoop("spiral", _spiral),
+        OpenLoop("eight", _eight),
+    )
 }
 """By name. The scenario's motion ``constant`` is the one that drives straight ahead."""

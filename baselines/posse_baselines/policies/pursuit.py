@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds
-from posse_baselines.laws.offsets import constants_of, offsets_of
-from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations
+from posse.numeric import FloatArray
+from posse_baselines.policy import BasePolicy, Memory, check_observations
 
 _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
 _STOP: Final = 0.9  # distance from the target at which it stops, m
-
-
-@dataclass(frozen=True)
-class _PursuitMemory(OwnArrays):
-    layout: ObservationLayout
-    num_worlds: int
-    offsets: Records
-    constants: Records
 
 
 class Pursuit(BasePolicy):
@@ -30,58 +19,23 @@ class Pursuit(BasePolicy):
 
     name = "pursuit"
 
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory: the layout, the number of worlds, where the fields are."""
-        check_fits(self, layout)
-        return _PursuitMemory(layout, num_worlds, offsets_of(layout), constants_of(layout.scenario))
-
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions straight at the last fix of the target; in a circle without one."""
-        m: _PursuitMemory = memory
-        observations = check_observations(self, observations, m.num_worlds, m.layout)
-        num_worlds, num_trackers = observations.shape[:2]
-        actions = np.zeros((num_worlds, num_trackers, 2 + m.layout.scenario.message_size), np.float32)
-        over_worlds(pursue_all, (m.offsets, m.constants, observations, actions), num_worlds, num_trackers)
+        layout: ObservationLayout = memory
+        s = layout.scenario
+        v = layout.views(check_observations(self, observations, len(observations), layout))
+        fix = v["target_range"][..., None] * v["target_bearing"]
+        x, y = np.moveaxis(fix + np.maximum(v["target_age"], 0.0)[..., None] * v["target_velocity"], -1, 0)
+        known, bearing = v["target_known"] > 0, np.arctan2(y, x)
+        turn = np.where(known, bearing / (2.0 * s.control_step * v["max_turn_rate"]), 0.2)
+        speed = np.where(known, np.where(np.hypot(x, y) > _STOP, np.maximum(np.cos(bearing), 0.0), 0.0), 1.0)
+        # What is ahead within the keep-away width turns it aside, and slows it.
+        angles = 2.0 * np.pi * np.arange(s.sonar_beams) / max(1, s.sonar_beams)
+        if (ahead := np.cos(angles) > 0.3).any():
+            closeness = 1.0 - v["sonar"][..., ahead] / _KEEP_AWAY
+            near, left = closeness > 0.0, np.where(angles[ahead] <= np.pi, 1.0, -1.0)
+            speed = np.minimum(speed, np.where(near, 0.8 * (1.0 - closeness), 1.0).min(axis=-1))
+            turn = turn - np.where(near, left * (0.5 + closeness), 0.0).sum(axis=-1)
+        actions = np.zeros((*turn.shape, 2 + s.message_size), np.float32)
+        actions[..., 0], actions[..., 1] = 2.0 * speed - 1.0, np.clip(turn, -1.0, 1.0)
         return actions, memory
-
-
-@compiled
-def pursue(at: Record, dt: float, row: FloatArray, action: FloatArray) -> None:
-    """Write one tracker's action (2 + m,) for what it is given, (F,)."""
-    speed, turn = 1.0, 0.2
-    if row[at.target_known] > 0.0:
-        age = max(0.0, row[at.target_age])
-        x = row[at.target_range] * row[at.target_bearing] + age * row[at.target_velocity]
-        y = row[at.target_range] * row[at.target_bearing + 1] + age * row[at.target_velocity + 1]
-        bearing = math.atan2(y, x)
-        turn = bearing / (2.0 * dt * row[at.max_turn_rate])
-        speed = max(0.0, math.cos(bearing)) if math.hypot(x, y) > _STOP else 0.0
-    # The nearest thing within the keep-away width turns it aside, and slows it if it is ahead.
-    for k in range(at.sonar_beams):
-        gap = row[at.sonar + k]
-        if gap < _KEEP_AWAY:
-            angle = 2.0 * math.pi * k / at.sonar_beams
-            angle = angle - 2.0 * math.pi if angle > math.pi else angle
-            closeness = 1.0 - gap / _KEEP_AWAY
-            if math.cos(angle) > 0.3:
-                speed = min(speed, 0.8 * (1.0 - closeness))
-                turn = turn - (1.0 if angle >= 0.0 else -1.0) * (0.5 + closeness)
-    action[0] = 2.0 * min(max(speed, 0.0), 1.0) - 1.0
-    action[1] = min(max(turn, -1.0), 1.0)
-
-
-@kernel
-def pursue_all(
-    offsets: Records,
-    constants: Records,
-    observations: FloatArray,
-    actions: FloatArray,
-    thread: int,
-    first: int,
-    end: int,
-) -> None:
-    """Write the actions of a share of the worlds."""
-    at, dt = offsets[0], constants[0].dt
-    for e in range(first, end):
-        for i in range(observations.shape[1]):
-            pursue(at, dt, observations[e, i], actions[e, i])

@@ -9,7 +9,7 @@ from tests.support.learned import network_for, policy_for
 import posse
 from posse_baselines import DDCS, PolicyError, load, play
 from posse_baselines.learned import Encoding, LearnedPolicy
-from posse_baselines.learned.advice import Advice, Advising
+from posse_baselines.learned.advice import Advice, check_adviser
 
 SCRIPT = DDCS.of("ddcs-distributed")
 
@@ -17,7 +17,7 @@ SCRIPT = DDCS.of("ddcs-distributed")
 def listener(answer: tuple[float, float], kind: str = "slots") -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
     encoding, adviser = Encoding.of(worlds().layout, kind), SCRIPT
-    size = encoding.size + Advising(adviser, believes=encoding.believes).inputs
+    size = encoding.size + check_adviser(adviser, believes=encoding.believes)
     network = network_for(size, weights=(np.zeros((2, size), np.float32),), biases=(np.array(answer, np.float32),))
     return LearnedPolicy(network, encoding, {"name": "mine"}, adviser)
 
@@ -55,10 +55,9 @@ def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
 def test_restarted_worlds_change_no_advice_in_the_others() -> None:
     rng = np.random.default_rng(0)
     batch, alone = worlds(4), worlds(1, first=2)
-    advising = Advising(SCRIPT, believes=True)
-    advice, other = Advice(advising, batch), Advice(advising, alone)
-    advice.restart(batch.reset(seed=5), np.ones(4, np.bool_))
-    other.restart(alone.reset(seed=5), np.ones(1, np.bool_))
+    advice, other = (Advice(SCRIPT, each.layout, each.num_worlds, believes=True) for each in (batch, alone))
+    advice.follow(batch.reset(seed=5))
+    other.follow(alone.reset(seed=5))
     for step in range(40):
         np.testing.assert_array_equal(advice.inputs[2], other.inputs[0])
         answers = rng.uniform(-0.2, 0.2, (4, 5, 2)).astype(np.float32)
@@ -67,12 +66,13 @@ def test_restarted_worlds_change_no_advice_in_the_others() -> None:
         other.follow(alone.step(alone_actions)[0])
         if step % 3 == 0:
             mask = np.array([True, step % 2 == 0, False, False])
-            advice.restart(batch.reset(options={"reset_mask": mask}), mask)
+            advice.restart(mask)
+            advice.follow(batch.reset(options={"reset_mask": mask}), mask)
 
 
 def test_only_policies_of_the_ddcs_are_advisers() -> None:
     for name in ("planner", "pursuit"):
         with pytest.raises(PolicyError, match="use a policy of the DDCS"):
-            Advising(load(name))
+            check_adviser(load(name), believes=False)
     with pytest.raises(PolicyError, match="needs an adviser"):
         policy_for(worlds().layout, "belief")

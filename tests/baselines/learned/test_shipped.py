@@ -13,7 +13,7 @@ from scripts.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_target_che
 import posse
 from posse_baselines import PolicyError, load, load_target, policy_names
 from posse_baselines.learned import Encoder, LearnedPolicy
-from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS, shipped, shipped_targets
+from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS, shipped
 from posse_training import evaluate
 
 TEAMS = sorted(SHIPPED.glob("*.safetensors"))
@@ -30,7 +30,7 @@ Another processor rounds otherwise, so that worlds decide otherwise once in a wh
 
 def test_every_file_is_known_by_its_name() -> None:
     assert sorted(shipped()) == [path.stem for path in TEAMS]
-    assert sorted(shipped_targets()) == [path.stem for path in TARGETS]
+    assert sorted(shipped(SHIPPED_TARGETS)) == [path.stem for path in TARGETS]
     assert set(shipped()) <= set(policy_names())
     with pytest.raises(PolicyError, match="unknown policy 'learned-nothing'") as caught:
         load("learned-nothing")

@@ -15,7 +15,7 @@ from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.advice import MOTION
 from posse_baselines.learned.features import NUM_FEATURES
-from posse_baselines.registry import shipped, shipped_targets
+from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_training.errors import SettingsError, require
 
 _OPSET: Final = 13
@@ -107,7 +107,7 @@ class _Export:
 def main(arguments: Sequence[str]) -> None:
     """Export the policy that the arguments name, and print what the network reads and gives."""
     which = tyro.cli(_Export, prog="posse export", args=arguments)
-    known = shipped() | shipped_targets()
+    known = shipped() | shipped(SHIPPED_TARGETS)
     path = known.get(which.policy, Path(which.policy))
     if path.suffix != ".safetensors":
         raise SettingsError(

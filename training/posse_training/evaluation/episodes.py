@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, Family, Scenario
 from posse.scenarios.family import blocks
-from posse_baselines import Played, Policy, Target, batch_for, rollout
+from posse_baselines import Played, Policy, Target, batch_for, load, rollout
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
@@ -46,22 +46,27 @@ def no_report(steps: int) -> None:
     """Take the number of steps that were played, and do nothing."""
 
 
+class Match(NamedTuple):
+    """Who plays against whom, and where."""
+
+    policy: str | Policy
+    """Or its name."""
+    target: Target | None
+    scenario: Scenario | Family
+    seed: int
+    split: str
+
+
 def play_shard(
-    policy: Policy,
-    target: Target | None,
-    scenario: Scenario | Family,
-    seed: int,
-    split: str,
-    shard: range,
-    *,
-    num_threads: int | None = None,
-    advance: Callable[[int], object] = no_report,
+    match: Match, shard: range, *, num_threads: int | None = None, advance: Callable[[int], object] = no_report
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
+    policy = load(match.policy) if isinstance(match.policy, str) else match.policy
+    where: dict[str, Any] = {"seed": match.seed, "split": match.split}
     played = []
-    for one, worlds in blocks(scenario, shard, seed, split):
-        world = {"seed": seed, "split": split, "first_world": worlds.start}
-        batch = batch_for(policy, one, len(worlds), target, **world, num_threads=num_threads)
+    for one, worlds in blocks(match.scenario, shard, **where):
+        place = {**where, "first_world": worlds.start, "num_threads": num_threads}
+        batch = batch_for(policy, one, len(worlds), match.target, **place)
         played.append(play_episode(batch, policy, advance))
     return joined(played)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from rich.console import Console
@@ -19,7 +20,7 @@ from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
-from posse_training.evaluation.episodes import limited, no_report, play_shard, refuse_trained_split
+from posse_training.evaluation.episodes import Match, limited, no_report, play_shard, refuse_trained_split
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
@@ -75,9 +76,8 @@ def evaluate(
     """
     given = scenario_or_family(scenario, **overrides)
     one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit, worlds=worlds)
-    settings = one.scenario
     with progress_bar(disable=progress is not True) as bar:
-        task = bar.add_task(escape(f"{one.policy.name} on {settings.name}"), total=one.steps)
+        task = bar.add_task(escape(f"{one.policy.name} on {one.match.scenario.name}"), total=one.steps)
 
         def advance(steps: int) -> None:
             bar.advance(task, steps)
@@ -85,9 +85,8 @@ def evaluate(
         report = progress if callable(progress) else advance
         if ray is False:
             report = limited(report, time_limit)
-            game = (one.policy, one.target, settings, seed, split)
-            how: dict[str, Any] = {"num_threads": num_threads, "advance": report}
-            return one.results(joined([play_shard(*game, shard, **how) for shard in one.shards]))
+            play = partial(play_shard, one.match._replace(policy=one.policy), num_threads=num_threads, advance=report)
+            return one.results(joined(list(map(play, one.shards))))
         with gathered_results([one], ray, lambda: report(one.steps // len(one.shards))) as (found,):
             if isinstance(found, Exception):
                 raise found
@@ -99,31 +98,27 @@ class Evaluation:
     """What :func:`evaluate` plays, checked."""
 
     policy: Policy
-    sent: str | Policy
-    """What a worker of a cluster gets: a name that it can load itself, else the policy."""
-    scenario: Scenario | Family
+    match: Match
+    """What a worker of a cluster gets, with a name that it can load itself if there is one for the policy."""
     shards: Sequence[range]
-    seed: int
-    split: str
-    target: Target | None
     time_limit: float | None
 
     @property
     def job(self) -> Job:
         """The evaluation for a cluster."""
-        played = (self.sent, self.target, self.scenario, self.seed, self.split, self.time_limit)
-        return Job(_play_on_worker, played, self.shards)
+        return Job(_play_on_worker, (self.match, self.time_limit), self.shards)
 
     @property
     def steps(self) -> int:
         """Control steps of all batches."""
-        parts = (blocks(self.scenario, shard, self.seed, self.split) for shard in self.shards)
-        return self.scenario.horizon * sum(1 for part in parts for _ in part)
+        _, _, scenario, seed, split = self.match
+        parts = (blocks(scenario, shard, seed, split) for shard in self.shards)
+        return scenario.horizon * sum(1 for part in parts for _ in part)
 
     def results(self, columns: Arrays) -> Results:
         """Return the results, given the metrics of all worlds."""
-        named = None if self.target is None else self.target.name
-        return Results(self.policy.name, self.scenario, self.seed, self.split, columns, named)
+        _, target, scenario, seed, split = self.match
+        return Results(self.policy.name, scenario, seed, split, columns, None if target is None else target.name)
 
 
 def prepare(
@@ -151,8 +146,8 @@ def prepare(
     first, _ = next(blocks(scenario, range(1), 0, "train"))
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
-    sent = policy if is_name else loaded
-    return Evaluation(loaded, sent, scenario, cut(episodes, worlds), seed, split, opponent, time_limit)
+    match = Match(policy if is_name else loaded, opponent, scenario, seed, split)
+    return Evaluation(loaded, match, cut(episodes, worlds), time_limit)
 
 
 @contextmanager
@@ -169,35 +164,17 @@ def gathered_results(
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
 
 
-def _play_on_worker(
-    policy: str | Policy,
-    target: Target | None,
-    scenario: Scenario | Family,
-    seed: int,
-    split: str,
-    time_limit: float | None,
-    shard: range,
-) -> Arrays:
+def _play_on_worker(match: Match, time_limit: float | None, shard: range) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
-    if isinstance(policy, str) and is_code(policy) and time_limit is not None:
-        found: Arrays = apart(time_limit, _play_here, policy, target, scenario, seed, split, time_limit, shard)
+    if isinstance(match.policy, str) and is_code(match.policy) and time_limit is not None:
+        found: Arrays = apart(time_limit, _play_here, match, time_limit, shard)
         return found
-    return _play_here(policy, target, scenario, seed, split, time_limit, shard)
+    return _play_here(match, time_limit, shard)
 
 
-def _play_here(
-    policy: str | Policy,
-    target: Target | None,
-    scenario: Scenario | Family,
-    seed: int,
-    split: str,
-    time_limit: float | None,
-    shard: range,
-) -> Arrays:
+def _play_here(match: Match, time_limit: float | None, shard: range) -> Arrays:
     with played_errors():
-        loaded = load(policy) if isinstance(policy, str) else policy
-        advance = limited(no_report, time_limit)
-        return play_shard(loaded, target, scenario, seed, split, shard, num_threads=1, advance=advance)
+        return play_shard(match, shard, num_threads=1, advance=limited(no_report, time_limit))
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from posse_training.provenance import commit
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import LIMIT, Normaliser
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import make_advising
+from posse_training.train.worlds import adviser_of
 
 
 def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
@@ -48,9 +48,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         activation=settings.activation,
         output=algorithm.bound,
     )
-    advising = make_advising(settings)
-    adviser = None if advising is None else advising.adviser
-    return LearnedPolicy(network, encoding, card, adviser, settings.safeguard)
+    return LearnedPolicy(network, encoding, card, adviser_of(settings), settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

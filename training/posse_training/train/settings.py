@@ -14,7 +14,7 @@ import tyro
 from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, load
-from posse_baselines.fields import number, optional
+from posse_baselines.fields import number
 from posse_training.errors import SettingsError, check_settings
 from posse_training.files import read_json
 from posse_training.options import Changes, MaybeNames, Names, Pairs
@@ -71,7 +71,7 @@ class TrainSettings:
     """Drawn scenarios of a family that are trained on, each in a share of the worlds."""
     team_sizes: tuple[int, ...] = ()
     """Numbers of trackers to train with; default: the scenario's own."""
-    num_neighbours: int | None = optional(0, 4096, whole=True)
+    num_neighbours: int | None = number(None, "", 0, 4096)
     """Team-mates that the policy reads, nearest first; default: as many as are observed."""
     message_size: int = number(0, "", 0, 64)
     """Numbers that a tracker adds to its broadcast in each step."""
@@ -119,7 +119,7 @@ class TrainSettings:
     """Weight of the value function's error."""
     log_deviation: float = number(-0.5, "", -20, 5)
     """Logarithm of the actions' standard deviation at the start."""
-    final_log_deviation: float | None = optional(-20, 5)
+    final_log_deviation: float | None = number(None, "", -20, 5)
     """Upper limit of that logarithm at the end; it falls linearly. Default: no limit."""
 
     # sac and td3

@@ -29,7 +29,7 @@ from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import check_opponents, load_own, make_advising, make_env
+from posse_training.train.worlds import adviser_of, check_opponents, load_own, make_env
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -106,7 +106,7 @@ def check_before(settings: TrainSettings) -> None:
     check_algorithm(settings)
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
-    make_advising(settings)
+    adviser_of(settings)
     check_opponents(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:

@@ -18,8 +18,9 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
+from posse_baselines import Policy
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.learned.advice import MOTION, Advice, Advising
+from posse_baselines.learned.advice import MOTION, Advice, check_adviser
 from posse_baselines.safeguard import Guard
 from posse_training.train.world_state import StateWriter
 
@@ -41,7 +42,7 @@ class TeamVecEnv(VecEnv):
         batches: Batches of worlds, made with ``autoreset="disabled"`` and equal ``message_size``;
             team sizes may differ.
         encoding: Which inputs are read from an observation.
-        advising: Adviser whose proposals are appended to the observations, and corrected by the
+        adviser: Policy whose proposals are appended to the observations, and corrected by the
             actions (2,) (:mod:`posse_baselines.learned.advice`).
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`); not with an adviser, which has one.
@@ -57,7 +58,7 @@ class TeamVecEnv(VecEnv):
     Raises:
         ValueError: No batch, one that resets itself, a target that is an agent, batches whose actions differ in
             length, or a safeguard behind an adviser.
-        PolicyError: An encoding that does not fit.
+        PolicyError: An encoding that does not fit, or a policy that cannot be an adviser.
     """
 
     def __init__(
@@ -65,12 +66,12 @@ class TeamVecEnv(VecEnv):
         batches: Sequence[Batch],
         encoding: Encoding,
         *,
-        advising: Advising | None = None,
+        adviser: Policy | None = None,
         safeguard: bool = False,
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
-        self.action_length = _action_length(batches, advising, safeguard)
+        self.action_length = _action_length(batches, adviser, safeguard)
         self.encoding = encoding
         self.staggered = staggered
         scenarios = [batch.scenario for batch in batches]
@@ -78,7 +79,7 @@ class TeamVecEnv(VecEnv):
         slots = 0
         for batch in batches:
             state = StateWriter(batch, scenarios) if see_state else None
-            group = _SlotGroup(batch, encoding, advising, safeguard, state, slots)
+            group = _SlotGroup(batch, encoding, adviser, safeguard, state, slots)
             self._groups.append(group)
             slots = group.slots.stop
         self.private_size = self._groups[0].private_size
@@ -210,7 +211,7 @@ class TeamVecEnv(VecEnv):
         return [owners[slot] for slot in self._get_indices(indices)]
 
 
-def _action_length(batches: Sequence[Batch], advising: Advising | None, safeguard: bool) -> int:
+def _action_length(batches: Sequence[Batch], adviser: Policy | None, safeguard: bool) -> int:
     """Return the length of an action; raise if the batches do not go together."""
     if not batches:
         raise ValueError("no batches given: a vector of slots needs at least one")
@@ -223,9 +224,9 @@ def _action_length(batches: Sequence[Batch], advising: Advising | None, safeguar
         both = batch.observation_shape[1] == batch.scenario.num_agents
         if both and batch.scenario.target_motion == "agent":
             raise ValueError(f"the target of {batch.scenario.name!r} is an agent; one policy drives one side")
-    if advising and safeguard:
-        raise ValueError("an adviser safeguards by itself: leave out advising or safeguard")
-    lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
+    if adviser and safeguard:
+        raise ValueError("an adviser safeguards by itself: leave out adviser or safeguard")
+    lengths = {MOTION} if adviser else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
         raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")
     return lengths.pop()
@@ -241,7 +242,7 @@ class _SlotGroup:
         self,
         batch: Batch,
         encoding: Encoding,
-        advising: Advising | None,
+        adviser: Policy | None,
         safeguard: bool,
         state: StateWriter | None,
         first: int,
@@ -250,14 +251,14 @@ class _SlotGroup:
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         self.slots = slice(first, first + worlds * trackers)
         self._own_size = encoding.size
-        self.private_size = encoding.size + (advising.inputs if advising else 0)
+        self.private_size = encoding.size + check_adviser(adviser, believes=encoding.believes)
         self.size = self.private_size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         # What makes the robots' actions of the model's.
         self._layer: Advice | Guard | None = Guard(batch.layout, worlds) if safeguard else None
-        if advising:
-            self._layer = Advice(advising, batch)
+        if adviser:
+            self._layer = Advice(adviser, batch.layout, worlds, believes=encoding.believes)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
         # Rewards of the present episode so far, (E, N).
@@ -279,11 +280,9 @@ class _SlotGroup:
 
     def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
-        if isinstance(self._layer, Advice):
-            self._layer.restart(raw, mask)
-        elif self._layer is not None:
+        if self._layer is not None:
             self._layer.restart(mask)
-            self._layer.follow(raw)
+            self._layer.follow(raw, mask)
         self._returns[mask] = 0
         self._cut_at[mask] = _NEVER
 
@@ -324,9 +323,8 @@ class _SlotGroup:
     def _encode(self, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
         """Write the observations of all slots, or of those of some worlds, to ``out``."""
         self._encoder.encode(raw[worlds], out[:, : self._own_size])
-        if isinstance(self._layer, Advice):
-            further = self._layer.inputs[worlds]
-            out[:, self._own_size : self.private_size] = further.reshape(-1, further.shape[-1])
+        if self._layer is not None:
+            out[:, self._own_size : self.private_size] = self._layer.inputs[worlds].reshape(len(out), -1)
         if self._state is not None:
             self._state.write(out[:, self.private_size :], worlds)
 

@@ -9,7 +9,7 @@ import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import Advising
+from posse_baselines.learned.advice import check_adviser
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
@@ -81,21 +81,21 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
     return TeamVecEnv(
         batches,
         encoding,
-        advising=make_advising(settings),
+        adviser=adviser_of(settings),
         safeguard=settings.safeguard,
         see_state=ALGORITHMS[settings.algorithm].reads_state,
     )
 
 
-def make_advising(settings: TrainSettings) -> Advising | None:
-    """Return how a run's network is advised, if it is.
+def adviser_of(settings: TrainSettings) -> Policy | None:
+    """Return what advises a run's network, if it is advised.
 
     Raises:
         PolicyError: A policy that cannot be an adviser.
     """
-    if settings.advise is None:
-        return None
-    return Advising(load(settings.advise), believes=settings.encoding == "belief")
+    adviser = None if settings.advise is None else load(settings.advise)
+    check_adviser(adviser, believes=settings.encoding == "belief")
+    return adviser
 
 
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:

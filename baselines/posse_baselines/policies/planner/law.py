@@ -13,15 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, Scenario
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
+from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
-from posse_baselines.laws.assignment import WORK_ROWS, assign
-from posse_baselines.laws.geometry import angle_of, dot, length, wrap
+from posse_baselines.ddcs.memory import UNLIMITED, Work, work_for
+from posse_baselines.laws.assignment import assign
+from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
 from posse_baselines.laws.guidance import BODY, regulate, write_motion
-from posse_baselines.laws.safeguard import DISC, NEAR, PLAYS, put_disc, put_walls, safe_velocity
+from posse_baselines.laws.safeguard import NEAR, put_disc, put_walls, safe_velocity
 from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
 
-_UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
 _MEAN_TIME: Final = 6.0  # s; time constant of that mean
@@ -29,54 +29,29 @@ _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
 _TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 _CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
 _MARGIN: Final = 0.15  # m; free width that is kept; twice as much to the target
-_MOST_DISCS: Final = 32
 _SOON: Final = 0.3  # s; a slot met sooner is followed as it moves now
 _FARTHEST: Final = 20.0  # s; later meetings are as good as this one
 _MET: Final = 0.02  # m
 _LEAST_STEP: Final = 0.01  # s
 _MOST_STEPS: Final = 40
 
-WAY: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        [
-            ("ahead", np.float64),  # shift of the slot along the target's heading, m
-            ("left", np.float64),  # shift of the slot to its left, m
-            ("gain", np.float64),  # of the slot law, 1/s
-            ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
-        ],
-    )
+WAY: Final = record_type(
+    ("ahead", np.float64),  # shift of the slot along the target's heading, m
+    ("left", np.float64),  # shift of the slot to its left, m
+    ("gain", np.float64),  # of the slot law, 1/s
+    ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
 )
 """How one tracker plays."""
 
-PLAN: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        [
-            ("slot", np.int32),  # -1: none yet
-            ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in the first record
-            ("mean_y", np.float32),
-            ("wish_x", np.float32),  # the safe velocity that it was to have, m/s
-            ("wish_y", np.float32),
-        ],
-    )
+PLAN: Final = record_type(
+    ("slot", np.int32),  # -1: none yet
+    ("mean", np.complex64),  # running mean of the target's velocity, m/s; used only in the first record
+    ("wish", np.complex64),  # the safe velocity that it was to have, m/s
+    *((name, BODY[name]) for name in BODY.names or ()),
 )
-"""Memory of one tracker."""
-
-
-class Work(NamedTuple):
-    """Arrays that the law works in, one of each for a thread."""
-
-    cost: FloatArray
-    """(N, N) cost of each slot for each tracker, s."""
-    assigning: FloatArray
-    """(WORK_ROWS, N + 1) for the assignment."""
-    discs: Records
-    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
-    body: Record
-    """:data:`~posse_baselines.laws.guidance.BODY`."""
-    plays: Record
-    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
+"""Memory of one tracker, and its motion."""
+PLAN_AT_START: Final = np.zeros((), PLAN)
+PLAN_AT_START["slot"] = -1
 
 
 class Teams(NamedTuple):
@@ -84,7 +59,7 @@ class Teams(NamedTuple):
 
     config: Records
     """(1,) the scenario as kernels read it."""
-    slots: Records
+    slots: npt.NDArray[np.complex64]
     """(N,) position of each slot in the slot frame, m."""
     ways: Records
     """(E, N) :data:`WAY`."""
@@ -103,14 +78,13 @@ class Teams(NamedTuple):
 class Scene(NamedTuple):
     """One world as the law reads it."""
 
+    teams: Teams
     config: Record
-    slots: Records
     world: Record
     trackers: Records
     obstacles: Records
     ways: Records
     plans: Records
-    late: FloatArray
     path: FloatArray
     since: int
     """Control steps since the path began; -1: there is none."""
@@ -121,19 +95,10 @@ class Scene(NamedTuple):
 def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
     """Return teams that play ways (E, N) and have no slots yet and no path foreseen, of up to so many positions."""
     num_worlds, n = ways.shape
-    plans = np.zeros((num_worlds, n), PLAN)
-    plans["slot"] = -1
-    work = Work(
-        np.zeros((MOST_THREADS, n, n), np.float32),
-        np.zeros((MOST_THREADS, WORK_ROWS, n + 1), np.float32),
-        np.zeros((MOST_THREADS, _MOST_DISCS), DISC),
-        np.zeros(MOST_THREADS, BODY),
-        np.zeros(MOST_THREADS, PLAYS),
-    )
     paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
-    return Teams(
-        config_record(scenario), slot_records(scenario), ways, plans, np.zeros(n, np.float32), paths, begun, work
-    )
+    plans, late = np.full(ways.shape, PLAN_AT_START), np.zeros(n, np.float32)
+    slots = np.array([complex(slot.x, slot.y) for slot in slot_records(scenario)], np.complex64)
+    return Teams(config_record(scenario), slots, ways, plans, late, paths, begun, work_for(n))
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
@@ -150,18 +115,18 @@ def velocity_of(r: Record) -> complex:
 @compiled
 def arm_of(scene: Scene, slot: int) -> complex:
     """Return where a slot is from the target, m."""
-    return complex(scene.slots[slot].x, scene.slots[slot].y) * complex(scene.world.frame_cos, scene.world.frame_sin)
+    place: complex = scene.teams.slots[slot]
+    return place * complex(scene.world.frame_cos, scene.world.frame_sin)
 
 
 @compiled
 def course_of(scene: Scene) -> Course:
     """Return how the target is taken to move."""
-    mean = complex(scene.plans[0].mean_x, scene.plans[0].mean_y)
-    return Course(velocity_of(scene.world), mean, _WEAVE_TIME, scene.frame_rate)
+    return Course(velocity_of(scene.world), scene.plans[0].mean, _WEAVE_TIME, scene.frame_rate)
 
 
 @compiled
-def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
+def foreseen(path: FloatArray, at: float, slot: complex) -> complex:
     """Return where a slot will be, m, ``at`` control steps along a path.
 
     The path (T, 4) is the target's x, y and the slot frame's cosine and sine at each step; beyond
@@ -174,11 +139,11 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
     s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
     x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
     y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
-    return complex(x, y) + complex(slot.x, slot.y) * complex(c, s)
+    return complex(x, y) + slot * complex(c, s)
 
 
 @compiled
-def arrival_time(scene: Scene, i: int, slot: Record) -> float:
+def arrival_time(scene: Scene, i: int, slot: complex) -> float:
     """Return when tracker i can be in a slot on the foreseen path, straight on at full speed, s from now.
 
     A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds
@@ -208,12 +173,12 @@ def assign_slots(scene: Scene, work: Work) -> None:
         for k in range(n):
             way = complex(w.x, w.y) + arm_of(scene, k) - complex(t.x, t.y)
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene, i, scene.slots[k])
+                time = arrival_time(scene, i, scene.teams.slots[k])
             else:
                 time = time_to_slot(way, course_of(scene), speed)
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
-            time += scene.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
+            time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
             work.cost[rows, k] = time
@@ -257,9 +222,9 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene, i, scene.slots[slot])
+        time = arrival_time(scene, i, scene.teams.slots[slot])
         if time > _SOON:
-            goal = foreseen(scene.path, scene.since + time / dt, scene.slots[slot])
+            goal = foreseen(scene.path, scene.since + time / dt, scene.teams.slots[slot])
             moved = goal - complex(w.x, w.y) - arm
             velocity = complex(moved.real / time, moved.imag / time)
             offset = way_round(start, arm, _CLEARANCE) + shift - start
@@ -276,36 +241,35 @@ def frame_rate_of(c: Record, w: Record) -> float:
 
 
 @compiled
+def read_motion(c: Record, t: Record, me: Record) -> None:
+    """Take a tracker's motion and limits into its plan."""
+    me.heading, me.speed, me.omega = complex(t.heading_cos, t.heading_sin), t.speed, t.turn_rate
+    me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
+    me.acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else UNLIMITED
+    me.turn_acceleration = 1.0 / c.per_turn_acceleration if c.per_turn_acceleration > 0.0 else UNLIMITED
+
+
+@compiled
 def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
-    c, w, body = scene.config, scene.world, work.body
-    body.dt, body.acceleration, body.turn_acceleration = float(c.control_step), _UNLIMITED, _UNLIMITED
-    if c.per_acceleration > 0.0:
-        body.acceleration = 1.0 / c.per_acceleration
-    if c.per_turn_acceleration > 0.0:
-        body.turn_acceleration = 1.0 / c.per_turn_acceleration
-    target = scene.plans[0]
+    c, w, target = scene.config, scene.world, scene.plans[0]
     share = min(1.0, float(c.control_step) / _MEAN_TIME) if w.step > 0 else 1.0
-    target.mean_x += share * (w.speed * w.heading_cos - target.mean_x)
-    target.mean_y += share * (w.speed * w.heading_sin - target.mean_y)
+    target.mean += scaled(velocity_of(w) - target.mean, share)
     if w.step % _REPLAN_STEPS == 0 or target.slot < 0:
         assign_slots(scene, work)
     for i in range(c.num_trackers):
-        t = scene.trackers[i]
+        t, me = scene.trackers[i], scene.plans[i]
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
-        velocity = wanted_velocity(scene, i, body.acceleration)
+        read_motion(c, t, me)
+        velocity = wanted_velocity(scene, i, me.acceleration)
         discs = work.discs[: surround(scene, i, work.discs)]
-        body.heading = complex(t.heading_cos, t.heading_sin)
-        body.speed, body.omega = t.speed, t.turn_rate
-        body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
-        velocity, _ = safe_velocity(body, discs, velocity, work.plays)
-        scene.plans[i].wish_x, scene.plans[i].wish_y = velocity.real, velocity.imag
-        v, omega = regulate(body, velocity, 0.0)
+        me.wish, _ = safe_velocity(me, discs, velocity, work.plays)
+        v, omega = regulate(me, me.wish, 0.0)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
-            more = 1.0 / (1.0 - math.exp(-body.dt / c.actuator_lag)) - 1.0
-            v, omega = v + more * (v - body.speed), omega + more * (omega - body.omega)
+            more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
+            v, omega = v + more * (v - me.speed), omega + more * (omega - me.omega)
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 
@@ -315,21 +279,20 @@ def drive_all(
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
     w = teams.work
-    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.body[thread], w.plays[thread])
+    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.plays[thread])
     copies = len(going) // len(teams.begun)
     for e in range(first, end):
         if going[e]:
             config, world, shared = teams.config[0], worlds.world[e], e // copies
             begun = teams.begun[shared]
             scene = Scene(
+                teams,
                 config,
-                teams.slots,
                 world,
                 worlds.tracker[e],
                 worlds.obstacle[e],
                 teams.ways[e],
                 teams.plans[e],
-                teams.late,
                 teams.paths[shared],
                 world.step - begun if 0 <= begun <= world.step else -1,
                 frame_rate_of(config, world),

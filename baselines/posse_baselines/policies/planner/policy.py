@@ -11,7 +11,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.law import PLAN, WAY, Teams, drive, teams_of
+from posse_baselines.policies.planner.law import PLAN_AT_START, WAY, Teams, drive, teams_of
 from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
@@ -97,7 +97,7 @@ class Search(OwnArrays):
     def restart(self, mask: BoolArray) -> None:
         """Forget what was planned for the worlds of a mask (E,)."""
         self.teams.ways[mask] = _STANDARD[0]
-        self.teams.plans[mask] = np.array((-1, 0, 0, 0, 0), PLAN)
+        self.teams.plans[mask] = PLAN_AT_START
         self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:
@@ -117,7 +117,7 @@ class Search(OwnArrays):
         if delay == 0:
             return self.batch
         self._later = self.batch.copies(1, seed=self.settings.seed, into=self._later)
-        unread = _actions_of_target(self._later)
+        unread = actions_of_target(self._later)
         for _ in range(delay):
             self._later.step(unread)
         return self._later
@@ -172,7 +172,7 @@ def play_ahead(
         world[name] = 0  # those before now are the same for all
     worth = np.zeros(copies.num_worlds)
     paths = np.empty((copies.num_worlds, steps + 1, 4), np.float32)
-    actions = _actions_of_target(copies)
+    actions = actions_of_target(copies)
     going = np.asarray(world["over"] == 0)
     paths[:, 0] = _pose_of_target(world)
     for step in range(1, steps + 1):
@@ -190,7 +190,7 @@ def play_ahead(
     return worth - np.where(going, distance_cost * away, 0.0), paths
 
 
-def _actions_of_target(batch: Batch) -> FloatArray:
+def actions_of_target(batch: Batch) -> FloatArray:
     """Return actions (E, rows, 2 + m) in which a target that is an agent goes on as it moves now."""
     s, world = batch.scenario, batch.arrays.world
     actions = np.zeros(batch.action_shape, np.float32)
