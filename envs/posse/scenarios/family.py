@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.registry import unknown
+from posse.declarations import unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError, UnknownSettingError, fail

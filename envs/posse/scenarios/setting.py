@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
-from posse.registry import unknown
+from posse.declarations import unknown
 
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word
 MAX_OBSTACLES: Final = 60  # the four walls use the last bits
