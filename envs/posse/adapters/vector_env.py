@@ -77,7 +77,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         begun = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
         working = self.batch.working if self.scenario.breaks else None
         infos = self._own(self.batch.infos.build(np.zeros(self.num_envs), self._no_terms().transpose(2, 0, 1), working))
-        return self._observed(observations), _with_masks(_zeroed(infos, begun), begun)
+        return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
@@ -100,13 +100,9 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             infos = _zeroed(infos, ~ended)
             if "working" in infos:
                 infos["working"] = self.batch.working[:, self._rows]
-        own = rewards[:, self._rows].reshape(self.num_envs, -1).mean(axis=1, dtype=np.float64)
-        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_))
-        return self._observed(observations), own, terminated, truncated, infos | more
-
-    def _observed(self, observations: FloatArray) -> FloatArray:
-        """Return the agents' part of the observations."""
-        return np.ascontiguousarray(observations[:, self._rows])
+        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | more
+        own = rewards.mean(axis=1, dtype=np.float64)
+        return observations[:, self._rows], own, terminated, truncated, infos
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of a batch's infos, in the types of Gymnasium's own vector environments."""
