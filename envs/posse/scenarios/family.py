@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -215,8 +216,6 @@ def blocks(given: Scenario | Family, worlds: range, seed: int, split: str) -> It
     if isinstance(given, Scenario):
         yield given, worlds
         return
-    first = worlds.start
-    while first < worlds.stop:
-        end = min((first // BLOCK + 1) * BLOCK, worlds.stop)
-        yield given.draw(first // BLOCK, seed, split), range(first, end)
-        first = end
+    for k in range(worlds.start // BLOCK, math.ceil(worlds.stop / BLOCK)):
+        inside = range(max(BLOCK * k, worlds.start), min(BLOCK * (k + 1), worlds.stop))
+        yield given.draw(k, seed, split), inside
