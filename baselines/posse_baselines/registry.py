@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
-from posse.registry import unknown
+from posse.declarations import unknown
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.policies.scripted import ABLATIONS, SCRIPTED

@@ -11,6 +11,7 @@ from posse.adapters.robot import Command, Heard, Robot, TargetFix
 from posse.declarations import (
     SENSORS,
     TARGET_MOTIONS,
+    DeclarationError,
     Field,
     Memory,
     Metric,
@@ -25,7 +26,6 @@ from posse.declarations import (
 )
 from posse.engine.batch import Batch, Snapshot
 from posse.engine.opponent import PairedBatch, TargetPolicy, batch, batches
-from posse.registry import DeclarationError
 from posse.scenarios import Family, Scenario, ScenarioError, family, family_names, get_scenario, scenario_names
 from posse.signals.generate import kernel_source
 from posse.signals.layout import ObservationLayout

@@ -52,13 +52,6 @@ class Subject:
         self.env = inner = MAKERS[kind]()
         self.batch: posse.Batch = inner if kind == "batch" else inner.batch
 
-    def reset(self, **arguments: Any) -> Any:
-        return self.env.reset(**arguments)
-
-    def step(self, action: Any) -> Any:
-        """Step with an argument of the kind's ``step``."""
-        return self.env.step(action)
-
     def good_action(self, rng: np.random.Generator) -> Any:
         """Return a valid action."""
         scenario = self.batch.scenario

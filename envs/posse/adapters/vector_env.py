@@ -75,9 +75,9 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         super().reset(seed=None if seed is None else int(seed))
         mask = options_of(options).get("reset_mask")
         begun = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
-        terms = np.zeros((*self.batch.observation_shape[:2], len(self.batch.term_names)), np.float32)
-        infos = self._own(self.batch._infos_of(np.zeros(self.num_envs), terms))
-        return self._observed(observations), _with_masks(_zeroed(infos, begun), begun)
+        working = self.batch.working if self.scenario.breaks else None
+        infos = self._own(self.batch.infos.build(np.zeros(self.num_envs), self._no_terms().transpose(2, 0, 1), working))
+        return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
@@ -100,13 +100,9 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             infos = _zeroed(infos, ~ended)
             if "working" in infos:
                 infos["working"] = self.batch.working[:, self._rows]
-        own = rewards[:, self._rows].reshape(self.num_envs, -1).mean(axis=1, dtype=np.float64)
-        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_))
-        return self._observed(observations), own, terminated, truncated, infos | more
-
-    def _observed(self, observations: FloatArray) -> FloatArray:
-        """Return the agents' part of the observations."""
-        return np.ascontiguousarray(observations[:, self._rows])
+        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | more
+        own = rewards.mean(axis=1, dtype=np.float64)
+        return observations[:, self._rows], own, terminated, truncated, infos
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of a batch's infos, in the types of Gymnasium's own vector environments."""
@@ -160,9 +156,8 @@ class FamilyVectorEnv(VectorEnv[Any, Any, Any]):
         self.parts = tuple(parts)
         self.metadata = self.parts[0].metadata
         self.render_mode = self.parts[0].render_mode
-        ends = np.cumsum([part.num_envs for part in self.parts])
-        self._slices = [slice(end - part.num_envs, end) for end, part in zip(ends, self.parts, strict=True)]
-        self.num_envs = int(ends[-1])
+        self._sizes = [part.num_envs for part in self.parts]
+        self.num_envs = sum(self._sizes)
         self.single_observation_space = _union([part.single_observation_space for part in self.parts])
         self.single_action_space = self.parts[0].single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -170,16 +165,27 @@ class FamilyVectorEnv(VectorEnv[Any, Any, Any]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start episodes in all worlds, or in those of ``options["reset_mask"]``."""
-        found = [part.reset(seed=seed, options=self._options(options, one)) for one, part in self._each()]
-        return np.concatenate([observations for observations, _ in found]), self._infos([infos for _, infos in found])
+        given = options_of(options)
+        mask = given.get("reset_mask")
+        mask = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
+        if mask.shape != (self.num_envs,):
+            raise ValueError(f"reset_mask has shape {mask.shape}, wanted ({self.num_envs},)")
+        parts = zip(self.parts, self._split(mask), strict=True)
+        found = [part.reset(seed=seed, options={**given, "reset_mask": chosen}) for part, chosen in parts]
+        observations, infos = zip(*found, strict=True)
+        return np.concatenate(observations), _joined(infos, self._sizes)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Advance every world by one control step."""
         whole = real_numbers("the array of actions", actions, self.action_space.shape)
-        found = [part.step(whole[one]) for one, part in self._each()]
+        found = [part.step(actions) for part, actions in zip(self.parts, self._split(whole), strict=True)]
         *arrays, infos = zip(*found, strict=True)
-        observations, rewards, terminated, truncated = (np.concatenate(each) for each in arrays)
-        return observations, rewards, terminated, truncated, self._infos(list(infos))
+        observations, rewards, terminated, truncated = map(np.concatenate, arrays)
+        return observations, rewards, terminated, truncated, _joined(infos, self._sizes)
+
+    def _split(self, values: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Return the part of each environment in values of all worlds."""
+        return np.split(values, np.cumsum(self._sizes)[:-1])
 
     def render(self) -> Any:
         """Draw every world; in the mode "human", the first one."""
@@ -190,20 +196,6 @@ class FamilyVectorEnv(VectorEnv[Any, Any, Any]):
         """Close the window, if there is one."""
         for part in self.parts:
             part.close(**kwargs)
-
-    def _each(self) -> list[tuple[slice, TeamVectorEnv]]:
-        return list(zip(self._slices, self.parts, strict=True))
-
-    def _options(self, options: dict[str, Any] | None, one: slice) -> dict[str, Any] | None:
-        if options is None or options.get("reset_mask") is None:
-            return options
-        mask = np.asarray(options["reset_mask"])
-        if mask.shape != (self.num_envs,):
-            raise ValueError(f"reset_mask has shape {mask.shape}, wanted ({self.num_envs},)")
-        return {**options, "reset_mask": mask[one]}
-
-    def _infos(self, infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        return _joined(infos, [part.num_envs for part in self.parts])
 
 
 def team_vector(scenario: str | Scenario | Family = "constant", num_envs: int = 1, **settings: Any) -> VectorEnv:
@@ -219,9 +211,9 @@ def solo_vector(scenario: str | Scenario | Family = "constant", num_envs: int = 
 def _vector(
     kind: type[TeamVectorEnv], scenario: str | Scenario | Family, num_envs: int, settings: dict[str, Any]
 ) -> VectorEnv:
-    given = scenario_or_family(scenario) if isinstance(scenario, (str, Family)) else scenario
-    if not isinstance(given, Family):
-        return kind(scenario, num_envs, **settings)  # type: ignore[arg-type]
+    given = scenario_or_family(scenario)
+    if isinstance(given, Scenario):
+        return kind(given, num_envs, **settings)
     kind(given.base, num_envs, **settings).close()  # raises what is invalid
     seed, split, first = settings.get("seed"), settings.get("split", "train"), settings.pop("first_world", 0)
     parts = shares(given, num_envs, min(DRAWN, num_envs), seed or 0, split)

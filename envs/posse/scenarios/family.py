@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 
-from posse.registry import unknown
+from posse.declarations import unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError, UnknownSettingError, fail
@@ -110,16 +111,12 @@ class Family:
         return {"family": self.name, "ranges": ranges, **self.base.to_dict()}
 
 
-def _range(name: str, bounds: Any) -> Range:
-    if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
-        fail(name, bounds, "a range must be two numbers, (least, greatest)")
-    return tuple(bounds)
-
-
 def _check_range(name: str, bounds: Range) -> None:
     known = Scenario.settings()
     if name not in known:
         raise UnknownSettingError(unknown("setting", name, known))
+    if len(bounds) != 2:
+        fail(name, bounds, "a range must be two numbers, (least, greatest)")
     if name in _FIXED:
         fail(name, bounds, f"a family cannot vary {name}, {_FIXED[name]}: set it on its base")
     if "int" not in known[name].kind and not known[name].kind.startswith("float"):
@@ -154,39 +151,33 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
             settings, team sizes without ``num_neighbours``, or a setting that a family cannot vary.
     """
     if isinstance(base, str) and base in FAMILIES:
-        base = _named_family(base)
-    if isinstance(base, Family) and not settings and name is None:
-        return base
-    start, ranges = (base.base, dict(base.ranges)) if isinstance(base, Family) else (base, {})
-    rest, kinds = {}, Scenario.settings()
+        start, meaning, ranges = FAMILIES[base]
+        base = Family(name=base, base=get_scenario(start), ranges=tuple(ranges.items()), meaning=meaning)
+    ranges, rest, kinds = dict(base.ranges) if isinstance(base, Family) else {}, {}, Scenario.settings()
     for setting, value in settings.items():
         of_several = setting in kinds and kinds[setting].kind.startswith(("tuple", "Mapping"))
         if isinstance(value, (tuple, list)) and not of_several:
-            ranges[setting] = _range(setting, value)
+            ranges[setting] = tuple(value)
         else:
             ranges.pop(setting, None)
             rest[setting] = value
-    scenario, items = get_scenario(start, **rest), tuple(ranges.items())
+    scenario, items = get_scenario(base.base if isinstance(base, Family) else base, **rest), tuple(ranges.items())
     if isinstance(base, Family):
         return dataclasses.replace(base, name=name or base.name, base=scenario, ranges=items)
     return Family(name=name or "-".join([scenario.name, "family", *ranges]), base=scenario, ranges=items)
 
 
-FAMILIES: Final[dict[str, dict[str, Any]]] = {
-    "family-open": {
-        "base": "smart",
-        "meaning": "The open plane of smart, with slow and fast, agile and clumsy targets and trackers.",
-        "target_speed": (0.4, 0.7),
-        "target_turn_rate": (1.0, 2.5),
-        "tracker_turn_rate": (1.0, 2.0),
-    },
-    "family-arena": {
-        "base": "obstacles",
-        "meaning": "Arenas of many sizes with none to eight obstacles, and targets of many speeds.",
-        "arena": (18.0, 28.0),
-        "num_obstacles": (0, 8),
-        "target_speed": (0.3, 0.6),
-    },
+FAMILIES: Final[dict[str, tuple[str, str, dict[str, Range]]]] = {
+    "family-open": (
+        "smart",
+        "The open plane of smart, with slow and fast, agile and clumsy targets and trackers.",
+        {"target_speed": (0.4, 0.7), "target_turn_rate": (1.0, 2.5), "tracker_turn_rate": (1.0, 2.0)},
+    ),
+    "family-arena": (
+        "obstacles",
+        "Arenas of many sizes with none to eight obstacles, and targets of many speeds.",
+        {"arena": (18.0, 28.0), "num_obstacles": (0, 8), "target_speed": (0.3, 0.6)},
+    ),
 }
 """Named families: base, sentence, ranges."""
 
@@ -194,12 +185,6 @@ FAMILIES: Final[dict[str, dict[str, Any]]] = {
 def family_names() -> tuple[str, ...]:
     """Return the names of all families."""
     return tuple(FAMILIES)
-
-
-def _named_family(name: str) -> Family:
-    settings = dict(FAMILIES[name])
-    base, meaning = settings.pop("base"), settings.pop("meaning")
-    return dataclasses.replace(family(base, name=name, **settings), meaning=meaning)
 
 
 def scenario_or_family(given: str | Scenario | Family, **overrides: Any) -> Scenario | Family:
@@ -231,8 +216,6 @@ def blocks(given: Scenario | Family, worlds: range, seed: int, split: str) -> It
     if isinstance(given, Scenario):
         yield given, worlds
         return
-    first = worlds.start
-    while first < worlds.stop:
-        end = min((first // BLOCK + 1) * BLOCK, worlds.stop)
-        yield given.draw(first // BLOCK, seed, split), range(first, end)
-        first = end
+    for k in range(worlds.start // BLOCK, math.ceil(worlds.stop / BLOCK)):
+        inside = range(max(BLOCK * k, worlds.start), min(BLOCK * (k + 1), worlds.stop))
+        yield given.draw(k, seed, split), inside

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import Any, Final
 
-from posse.registry import unknown
+from posse.declarations import unknown
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError
 

@@ -17,8 +17,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS
-from posse.registry import unknown
+from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
 from posse.scenarios.setting import (
     FAR,
     FARTHEST,

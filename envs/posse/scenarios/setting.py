@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
-from posse.registry import unknown
+from posse.declarations import unknown
 
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word
 MAX_OBSTACLES: Final = 60  # the four walls use the last bits
@@ -112,21 +112,21 @@ class Setting:
         """
         if isinstance(value, np.ndarray):
             value = value.tolist()
+        several = value if isinstance(value, (tuple, list)) else None
         match self.kind:
-            case "int":
-                return self._whole(name, value)
-            case "int | None":
-                return None if value is None else self._whole(name, value)
-            case "float":
-                return self._number(name, value)
-            case "float | tuple[float, ...]":
-                return self._numbers(name, value) if isinstance(value, (tuple, list)) else self._number(name, value)
-            case "float | tuple[float, float]":
-                return self._sides(name, value) if isinstance(value, (tuple, list)) else self._number(name, value)
+            case "float | tuple[float, ...]" if several is not None:
+                return self._numbers(name, several)
+            case "float | tuple[float, float]" if several is not None:
+                if len(several) != 2:
+                    fail(name, value, f"it must be a number in {self.range}: (width, height)")
+                width, height = self._numbers(name, several)
+                if width != height and math.inf in (width, height):
+                    fail(name, value, "width and height must both be finite")
+                return width if width == height else (width, height)  # equal scenarios compare equal
             case "tuple[float, float]":
-                if not isinstance(value, (tuple, list)) or len(value) != 2:
+                if several is None or len(several) != 2:
                     fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
-                least, most = self._numbers(name, value)
+                least, most = self._numbers(name, several)
                 if least > most:
                     fail(name, value, "the least must not be above the greatest")
                 return least, most
@@ -135,46 +135,31 @@ class Setting:
                     fail(name, value, "it must be True or False")
                 return bool(value)
             case "str":
-                return self._text(name, value)
+                if not isinstance(value, str):
+                    fail(name, value, "it must be a string")
+                if self.choices is not None and value not in self.choices:
+                    raise ScenarioError(unknown(name, value, self.choices))
+                return value
             case "tuple[str, ...]":
-                names = tuple(value) if isinstance(value, (tuple, list)) else (value,)
+                names = (value,) if several is None else tuple(several)
                 if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
                     fail(name, value, "it must be a tuple of names, each once")
                 return names
-            case _:
+            case kind if kind.startswith("Mapping"):
                 return self._weights(name, value)
-
-    def _whole(self, name: str, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, Integral) or not self.low <= int(value) <= self.high:
-            fail(name, value, f"it must be a whole number in {self.range}")
-        return int(value)
+        return None if value is None and "None" in self.kind else self._number(name, value)
 
     def _number(self, name: str, value: object) -> float:
-        if isinstance(value, Real) and not isinstance(value, bool):
+        whole = self.kind.startswith("int")
+        if isinstance(value, Integral if whole else Real) and not isinstance(value, bool):
             number: Any = value  # compared before it becomes a float, which a whole number may be too large for
             inside = self.low < number <= self.high if self.above else self.low <= number <= self.high
             if inside or (self.infinite and number == math.inf):
-                return float(number)
-        fail(name, value, f"it must be a number in {self.range}")
+                return int(number) if whole else float(number)
+        fail(name, value, f"it must be a {'whole ' if whole else ''}number in {self.range}")
 
     def _numbers(self, name: str, values: Iterable[object]) -> tuple[float, ...]:
         return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(values))
-
-    def _sides(self, name: str, values: tuple[object, ...] | list[object]) -> float | tuple[float, float]:
-        """Return width and height; equal ones as one number, so that equal scenarios compare equal."""
-        if len(values) != 2:
-            fail(name, values, f"it must be a number in {self.range}: (width, height)")
-        width, height = self._numbers(name, values)
-        if width != height and math.inf in (width, height):
-            fail(name, values, "width and height must both be finite")
-        return width if width == height else (width, height)
-
-    def _text(self, name: str, value: object) -> str:
-        if not isinstance(value, str):
-            fail(name, value, "it must be a string")
-        if self.choices is not None and value not in self.choices:
-            raise ScenarioError(unknown(name, value, self.choices))
-        return value
 
     def _weights(self, name: str, value: object) -> tuple[tuple[str, float], ...]:
         """Return weights sorted by name, so that equal scenarios compare equal."""

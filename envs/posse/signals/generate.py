@@ -20,15 +20,18 @@ from posse.declarations import (
     REWARD_TERMS,
     SENSORS,
     TARGET_MOTIONS,
+    Declaration,
     FieldDeclaration,
+    Function,
     Metric,
     RewardTerm,
     Sensor,
     TargetMotion,
     fields_of,
+    parameters_of,
+    place_of,
 )
 from posse.numeric import WIDTH
-from posse.registry import Declaration, Function, parameters_of, place_of
 from posse.scenarios import Scenario, get_scenario
 
 

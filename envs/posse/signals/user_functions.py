@@ -12,9 +12,9 @@ import numba
 import numpy as np
 from numba.core import types
 
+from posse.declarations import Function, parameters_of, plain
 from posse.numeric import UNCOMPILED
 from posse.numeric.lanes import LanesType, tuple_of_lanes
-from posse.registry import Function, parameters_of, plain
 from posse.rules.state import CONFIG, OBSTACLE, SLOT, TRACKER, world_record_of
 from posse.signals.generate import Declarations
 from posse.signals.views import Mate, View

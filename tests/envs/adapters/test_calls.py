@@ -41,32 +41,32 @@ class Calls(RuleBasedStateMachine):
             seed = self.first  # without one, a first reset draws its own
         self.started = True
         for subject in (self.one, self.twin):
-            subject.reset(seed=seed)
+            subject.env.reset(seed=seed)
 
     # Numbers stand for what hypothesis could not print: whole numbers of 5,000 digits.
 
     @rule(bad=st.integers(0, len(BAD_SEEDS) - 1))
     def bad_seed(self, bad: int) -> None:
-        self.refused(lambda: self.one.reset(seed=BAD_SEEDS[bad]))
+        self.refused(lambda: self.one.env.reset(seed=BAD_SEEDS[bad]))
 
     @rule(bad=st.integers(0, len(BAD_OPTIONS) - 1), seed=st.none() | SEEDS)
     def bad_options(self, bad: int, seed: int | None) -> None:
-        self.refused(lambda: self.one.reset(seed=seed, options=BAD_OPTIONS[bad]))
+        self.refused(lambda: self.one.env.reset(seed=seed, options=BAD_OPTIONS[bad]))
 
     @rule(bad=st.integers(0, 100))
     def bad_action(self, bad: int) -> None:
         actions = [*self.one.bad_actions()]
-        self.refused(lambda: self.one.step(actions[bad % len(actions)]))
+        self.refused(lambda: self.one.env.step(actions[bad % len(actions)]))
 
     @rule(draw=st.integers(0, 1000))
     def step(self, draw: int) -> None:
         if not self.started:
-            action = None if self.kind == "turns" else self.one.good_action(np.random.default_rng(draw))
-            self.refused(lambda: self.one.step(action))
+            action = self.one.good_action(np.random.default_rng(draw))
+            self.refused(lambda: self.one.env.step(action))
             return
         for subject in (self.one, self.twin):
             try:
-                subject.step(subject.good_action(np.random.default_rng(draw)))
+                subject.env.step(subject.good_action(np.random.default_rng(draw)))
             except ResetNeeded:
                 assert subject.batch.worlds["over"].any()
         assert same(self.one.held(), self.twin.held())
@@ -94,9 +94,9 @@ def played(subject: Subject, steps: int, seed: int = 0) -> list[Any]:
     rng, returned = np.random.default_rng(seed), []
     for _ in range(steps):
         try:
-            returned.append(subject.step(subject.good_action(rng)))
+            returned.append(subject.env.step(subject.good_action(rng)))
         except ResetNeeded:
-            returned.append(subject.reset())
+            returned.append(subject.env.reset())
     return returned
 
 
@@ -111,19 +111,19 @@ one_by_one = pytest.mark.parametrize("kind", [kind for kind in MAKERS if kind !=
 )
 def test_a_copy_made_in_mid_episode_goes_on_alike(kind: str, replica: Any) -> None:
     one, twin = Subject(kind), Subject(kind)
-    one.reset(seed=3)
+    one.env.reset(seed=3)
     played(one, 2)
     if kind in ("parallel", "team", "solo"):
         one.env.state()
     twin.env = replica(one.env)
     assert same(played(one, 20), played(twin, 20))
-    assert same(one.reset(seed=1), twin.reset(seed=1))
+    assert same(one.env.reset(seed=1), twin.env.reset(seed=1))
 
 
 @one_by_one
 def test_what_is_returned_is_never_overwritten(kind: str) -> None:
     subject = Subject(kind)
-    held = [subject.reset(seed=0)]
+    held = [subject.env.reset(seed=0)]
     kept = copy.deepcopy(held)
     for step in range(30):
         returned = played(subject, 1, step)

@@ -52,8 +52,7 @@ def test_solo_says_why_it_cannot_play(scenario: str) -> None:
     gymnasium.make(SOLO, scenario=scenario, breaks=0).reset(seed=0)
 
 
-def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+def test_pettingzoo_can_draw() -> None:
     render_test(posse.env)
     env = posse.parallel_env(render_mode="human")
     env.reset(seed=0)

@@ -155,9 +155,9 @@ def refused(subject: Subject, call: Any, *errors: type[Exception]) -> str:
 @pytest.mark.parametrize("seed", [2**63 - 1, np.int64(2**40)])
 def test_seeds_of_63_bits_are_seeds(kind: str, seed: Any) -> None:
     one, other, nearby = Subject(kind), Subject(kind), Subject(kind)
-    one.reset(seed=seed)
-    other.reset(seed=int(seed))
-    nearby.reset(seed=int(seed) % 2**32)
+    one.env.reset(seed=seed)
+    other.env.reset(seed=int(seed))
+    nearby.env.reset(seed=int(seed) % 2**32)
     drawn = [subject.batch.state["tracker_x"] for subject in (one, other, nearby)]
     assert np.array_equal(drawn[0], drawn[1])
     assert not np.array_equal(drawn[0], drawn[2])
@@ -170,12 +170,12 @@ def test_a_step_needs_an_episode(kind: str) -> None:
     for call in (subject.env.state, subject.env.render):
         with pytest.raises(ResetNeeded, match="before reset"):
             call()
-    subject.reset()
+    subject.env.reset()
     for _ in range(subject.env.scenario.horizon):
-        subject.step(good)
-    assert "after the end of the episode" in refused(subject, lambda: subject.step(good), ResetNeeded)
-    subject.reset()
-    subject.step(good)
+        subject.env.step(good)
+    assert "after the end of the episode" in refused(subject, lambda: subject.env.step(good), ResetNeeded)
+    subject.env.reset()
+    subject.env.step(good)
 
 
 @pytest.mark.parametrize(
@@ -196,8 +196,8 @@ def test_a_step_needs_an_episode(kind: str) -> None:
 def test_bad_options_change_nothing(options: dict[str, Any], word: str) -> None:
     subject = Subject("batch")
     subject.env = subject.batch = posse.batch("field", 2, num_obstacles=0, seed=9)
-    subject.reset()
-    assert re.search(word, refused(subject, lambda: subject.reset(seed=1, options=options)))
+    subject.env.reset()
+    assert re.search(word, refused(subject, lambda: subject.env.reset(seed=1, options=options)))
     assert subject.batch.seed == 9
 
 
