@@ -27,8 +27,7 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.contact import touches_surroundings
-from posse.rules.discs import columns, nonnegative
+from posse.rules.discs import TOUCHING_GAP, columns, nonnegative, surroundings_within
 from posse.rules.kinematics import turned
 from posse.rules.state import (
     CONDITION,
@@ -185,9 +184,9 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
         w = worlds.world[e]
         s.steps[lane] = np.float32(w.step)
         if c.target_agent != 0:
-            s.target_touching[lane] = np.float32(
-                w.touching != NO_BITS or touches_surroundings(c, w, worlds.obstacle[e])
-            )
+            reach, obstacles = c.robot_radius + TOUCHING_GAP, worlds.obstacle[e]
+            touching = w.touching != NO_BITS or surroundings_within(c, obstacles, w.x, w.y, reach)
+            s.target_touching[lane] = np.float32(touching)
 
 
 @compiled
