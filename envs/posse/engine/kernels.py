@@ -29,10 +29,9 @@ from posse.rules.senses.sensing import look
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import RULES, WorldArrays, beam_directions, config_record, scratch_record, slot_records
 from posse.scenarios import Scenario
-from posse.signals.generate import Declarations, Generated, generated_for
-from posse.signals.rows import TOGETHER, observe_sonar, observe_together
+from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
-from posse.signals.views import OBSERVING
+from posse.signals.views import OBSERVING, TOGETHER, Generated, observe_sonar, observe_together
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
