@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.kernels import IN_BOX, bad_action
+from posse.engine.kernels import MOST_ACTION, all_in_box
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 
@@ -69,17 +69,13 @@ def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions
 
     Numbers outside by rounding are always clipped. ``place(e, i, k)`` names an element in the message.
     """
-    position = bad_action(actions)
-    if position == IN_BOX:
+    if all_in_box(actions):
         return actions
-    if position >= 0 and not (clip and np.isfinite(actions).all()):
-        if clip:
-            position = int(np.isfinite(actions).argmin())
-        value = actions.flat[position]
+    allowed = np.isfinite(actions) if clip else np.abs(actions) <= MOST_ACTION
+    if not allowed.all():
+        e, i, k = np.argwhere(~allowed)[0]
         fix = "it must be finite" if clip else "scale the policy's output, or pass clip_actions=True"
-        raise ValueError(
-            f"{place(*np.unravel_index(position, actions.shape))} = {value} is not a number in [-1, 1]: {fix}"
-        )
+        raise ValueError(f"{place(e, i, k)} = {actions[e, i, k]} is not a number in [-1, 1]: {fix}")
     return actions.clip(-1, 1)
 
 

@@ -29,10 +29,9 @@ from posse.rules.senses.sensing import look
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import RULES, WorldArrays, beam_directions, config_record, scratch_record, slot_records
 from posse.scenarios import Scenario
-from posse.signals.generate import Declarations, Generated, generated_for
-from posse.signals.rows import TOGETHER, observe_sonar, observe_together
+from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
-from posse.signals.views import OBSERVING
+from posse.signals.views import OBSERVING, TOGETHER, Generated, observe_sonar, observe_together
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
@@ -301,22 +300,12 @@ def first_bad_start(config: Records, world: Records, tracker: Records, obstacle:
 
 MOST_ACTION: Final = np.float32(1 + 1e-6)
 """Actions up to this are clipped to 1, since rounding may exceed it."""
-IN_BOX: Final = -1
-TO_CLIP: Final = -2
 
 
 @kernel
-def bad_action(actions: FloatArray) -> int:
-    """Return the flat position of the first action that is outside [-1, 1], beyond rounding.
-
-    :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
-    """
+def all_in_box(actions: FloatArray) -> bool:
+    """Return whether all actions are in [-1, 1]."""
     flat, inside = actions.reshape(-1), True
     for k in range(len(flat)):
         inside &= flat[k] >= -ONE and flat[k] <= ONE
-    if inside:
-        return IN_BOX
-    for k in range(len(flat)):
-        if not (flat[k] >= -MOST_ACTION and flat[k] <= MOST_ACTION):
-            return k
-    return TO_CLIP
+    return inside

@@ -28,7 +28,7 @@ from posse.numeric import (
     out_of_line,
     root,
 )
-from posse.rules.discs import FAR, TOUCHING_GAP, blocks, obstacle_within
+from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -96,16 +96,6 @@ def free_of_surroundings(
 
 
 @compiled
-def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
-    """Return whether a robot touches an obstacle or a wall."""
-    if c.walled and abs(robot.x) >= c.half_width - c.robot_radius - TOUCHING_GAP:
-        return True
-    if c.walled and abs(robot.y) >= c.half_height - c.robot_radius - TOUCHING_GAP:
-        return True
-    return obstacle_within(obstacles, c.num_obstacles, robot.x, robot.y, c.robot_radius + TOUCHING_GAP)
-
-
-@compiled
 def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Find contacts, count those that begin, and mark robots with something near.
 
@@ -118,9 +108,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     target_touching, target_near = NO_BITS, False
     for i in range(c.num_trackers):
         t = trackers[i]
-        wall = FAR
-        if c.walled:
-            wall = min(inner_x - abs(t.x), inner_y - abs(t.y))
+        wall = min(inner_x - abs(t.x), inner_y - abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
         t.near, t.onsets = s.excess[i] <= ZERO or wall_near, 0
@@ -138,9 +126,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         # A scripted target rarely comes so near: after trackers blocked it (steering.way_out), or if it
         # crosses its clearance within a control step.
         way = TOUCHING_GAP + c.target_speed * c.control_step
-        near_wall = min(inner_x - abs(w.x), inner_y - abs(w.y)) <= way
-        near_any = near_wall or obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + way)
-        w.near = c.target_agent != 0 or near_any
+        w.near = c.target_agent != 0 or surroundings_within(c, obstacles, w.x, w.y, c.robot_radius + way)
     w.least_gap = smallest
 
 

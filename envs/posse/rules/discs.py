@@ -64,8 +64,14 @@ def obstacle_within(obstacles: Records, count: int, x: np.float32, y: np.float32
 
 @compiled
 def to_wall(c: Record, x: np.float32, y: np.float32) -> np.float32:
-    """Return the distance from a point to the nearest wall of the arena, m."""
+    """Return the distance from a point to the nearest wall of the arena, m; far without an arena."""
     return np.float32(min(c.half_width - abs(x), c.half_height - abs(y)))
+
+
+@compiled
+def surroundings_within(c: Record, obstacles: Records, x: np.float32, y: np.float32, reach: np.float32) -> bool:
+    """Return whether a wall, or the rim of an obstacle, is nearer than ``reach`` to a point."""
+    return bool(to_wall(c, x, y) < reach or obstacle_within(obstacles, c.num_obstacles, x, y, reach))
 
 
 @compiled

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled, out_of_line
-from posse.rules.discs import obstacle_within
+from posse.rules.discs import obstacle_within, surroundings_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
 from posse.rules.state import WorldArrays
@@ -42,11 +42,7 @@ def is_clear(
     clearance: np.float32 = _CLEARANCE,
 ) -> bool:
     """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
-    if c.walled and abs(x) > c.half_width - c.robot_radius - clearance:
-        return False
-    if c.walled and abs(y) > c.half_height - c.robot_radius - clearance:
-        return False
-    if obstacle_within(obstacles, c.num_obstacles, x, y, c.robot_radius + clearance):
+    if surroundings_within(c, obstacles, x, y, c.robot_radius + clearance):
         return False
     reach = c.robot_radius + c.robot_radius + clearance
     for j in range(placed):

@@ -33,6 +33,7 @@ from posse.declarations import (
 )
 from posse.numeric import WIDTH
 from posse.scenarios import Scenario, get_scenario
+from posse.signals.views import Generated
 
 
 class Declarations(NamedTuple):
@@ -67,35 +68,6 @@ def declarations_for(scenario: Scenario) -> Declarations:
     )
 
 
-class Generated(NamedTuple):
-    """The generated functions, for compiled code, and the lengths of what they write."""
-
-    write_own: Any
-    """Writes the own fields of eight observers."""
-    write_mate: Any
-    """Writes the fields of a team-mate of each of eight observers; the values for "unknown" where there is none."""
-    reward: Any
-    """Returns the reward of a tracker, and writes the values of its terms, (K,)."""
-    target_reward: Any
-    """Returns the same of a target that is an agent."""
-    draw_motion: Any
-    """Clears the memories of the target's motion, and draws its parameters for an episode."""
-    set_goal: Any
-    """Sets the goal heading of a scripted target."""
-    sees: Any
-    """Returns whether the target, (dx, dy) away, is in sight of a tracker."""
-    measure: Any
-    """Returns the vector to the target as measured."""
-    clear_sums: Any
-    """Sets the sums of the metrics to zero."""
-    add_to_sums: Any
-    """Adds a control step to the sums of the metrics."""
-    width: int
-    """Length of the observation before the sonar."""
-    mate_width: int
-    """Length of a team-mate's part, without its message."""
-
-
 @functools.cache
 def generated_for(declarations: Declarations) -> Generated:
     """Return the compiled functions for declarations."""
@@ -126,7 +98,7 @@ from numpy import float32
 from posse.numeric import ZERO, choose, compiled, eight
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
-from posse.signals.rows import write_block, write_column
+from posse.signals.views import write_block, write_column
 
 # The declared functions:'''
 

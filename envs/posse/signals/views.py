@@ -1,17 +1,22 @@
-"""Inputs of observation fields: views of the same robot of eight worlds, one per lane.
+"""How eight worlds' robots are observed: views, which are the inputs of fields, and rows, to which fields are written.
 
-With fewer than eight worlds the last one is repeated. Unused parts of a view are removed by the
-compiler.
+A view describes the same robot of eight worlds, one per lane; with fewer worlds the last one is repeated. The generated
+functions (:mod:`posse.signals.generate`) compute its fields. Each gives a *column* of eight numbers, one for each
+world; eight columns are transposed and written to the worlds' rows, those left over one by one.
+
+Team-mates follow, nearest first. With a perfect radio, and for a target agent, they are as they are now, otherwise as
+last heard.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from posse.numeric import (
     ONE,
+    TINY,
     WIDTH,
     ZERO,
     FloatArray,
@@ -19,20 +24,27 @@ from posse.numeric import (
     Mask,
     Record,
     Records,
+    bits,
     choose,
     compiled,
     counts,
     eight,
+    greater,
+    lesser,
     load,
+    load_fields,
+    out_of_line,
     root,
     store,
+    transpose,
 )
-from posse.rules.contact import touches_surroundings
-from posse.rules.discs import columns, nonnegative
+from posse.rules.discs import FAR, TOUCHING_GAP, columns, nonnegative, surroundings_within
 from posse.rules.kinematics import turned
+from posse.rules.senses.sonar import ping
 from posse.rules.state import (
     CONDITION,
     FIX,
+    MESSAGE,
     NEVER,
     NO_BITS,
     POSE,
@@ -41,6 +53,7 @@ from posse.rules.state import (
     Condition,
     Fields,
     Fix,
+    Heard,
     Odometry,
     Pose,
     WorldArrays,
@@ -67,16 +80,6 @@ class Observers(NamedTuple):
     e: int
     i: int
     number: int
-
-
-class Rows(NamedTuple):
-    """Where to write in the observations of eight robots."""
-
-    observers: Observers
-    observations: FloatArray
-    """(E, rows, F)."""
-    start: int
-    """Place in an observation that the first column goes to."""
 
 
 @compiled
@@ -185,9 +188,9 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
         w = worlds.world[e]
         s.steps[lane] = np.float32(w.step)
         if c.target_agent != 0:
-            s.target_touching[lane] = np.float32(
-                w.touching != NO_BITS or touches_surroundings(c, w, worlds.obstacle[e])
-            )
+            reach, obstacles = c.robot_radius + TOUCHING_GAP, worlds.obstacle[e]
+            touching = w.touching != NO_BITS or surroundings_within(c, obstacles, w.x, w.y, reach)
+            s.target_touching[lane] = np.float32(touching)
 
 
 @compiled
@@ -246,3 +249,206 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> 
         target_vx=fix.vx,
         target_vy=fix.vy,
     )
+
+
+class Generated(NamedTuple):
+    """The generated functions, for compiled code, and the lengths of what they write."""
+
+    write_own: Any
+    """Writes the own fields of eight observers."""
+    write_mate: Any
+    """Writes the fields of a team-mate of each of eight observers; the values for "unknown" where there is none."""
+    reward: Any
+    """Returns the reward of a tracker, and writes the values of its terms, (K,)."""
+    target_reward: Any
+    """Returns the same of a target that is an agent."""
+    draw_motion: Any
+    """Clears the memories of the target's motion, and draws its parameters for an episode."""
+    set_goal: Any
+    """Sets the goal heading of a scripted target."""
+    sees: Any
+    """Returns whether the target, (dx, dy) away, is in sight of a tracker."""
+    measure: Any
+    """Returns the vector to the target as measured."""
+    clear_sums: Any
+    """Sets the sums of the metrics to zero."""
+    add_to_sums: Any
+    """Adds a control step to the sums of the metrics."""
+    width: int
+    """Length of the observation before the sonar."""
+    mate_width: int
+    """Length of a team-mate's part, without its message."""
+
+
+TOGETHER: Final = WIDTH
+"""Worlds processed together."""
+
+
+@compiled
+def observe_together(
+    c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
+) -> None:
+    """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
+    n = nonnegative(c.num_trackers)
+    lay_out_observers(c, worlds, first, count, s)
+    for i in range(n + 1 if c.target_agent != 0 else n):
+        observers = Observers(first, i, count)
+        view = view_of(c, worlds, observers, s)
+        rows = observations[first : first + count, i]
+        made.write_own(c, view, s, rows)
+        now = c.perfect_radio != 0 or i == n
+        _list_nearest(c, worlds, observers, view, now, s)
+        start, size = nonnegative(made.width + c.sonar_beams), nonnegative(made.mate_width + c.message_size)
+        for p in range(nonnegative(c.neighbours)):
+            mate = _mate_in_place(c, worlds, observers, view, p, now, s)
+            made.write_mate(c, view, mate, s, rows[:, nonnegative(start + p * size) :])
+        if c.message_size > 0:
+            _write_messages(c, worlds, observers, made, s, rows)
+
+
+@compiled
+def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
+    """Write the sonar of every agent of a world to (rows, F), from ``first`` on.
+
+    Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
+    """
+    n = nonnegative(c.num_trackers)
+    for i in range(n):
+        t = trackers[i]
+        pose = (t.x, t.y, t.heading_cos, t.heading_sin)
+        ping(c, pose, i, s, observations[i], first)
+    if c.target_agent != 0:
+        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, s, observations[n], first)
+
+
+@compiled
+def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, now: bool, s: Record) -> None:
+    """List the nearest mates that the observers know; of equally near ones the lower number is first."""
+    n, places = nonnegative(c.num_trackers), nonnegative(c.neighbours)
+    for p in range(places):
+        store(s.placed, WIDTH * p, eight(-ONE))
+        store(s.placed_at, WIDTH * p, eight(FAR))
+    if places == 0:
+        return
+    for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
+        if j == observers.i:
+            continue
+        if now:
+            x, y, known = load(s.team_x, WIDTH * j), load(s.team_y, WIDTH * j), v.step >= ZERO
+        else:
+            x, y, known = _heard(c, worlds, observers, v, j)
+        ahead, left = ego(v, x - v.x, y - v.y)
+        number = choose(known, np.float32(j), -ONE)
+        distance = choose(known, root(ahead * ahead + left * left), FAR)
+        if bits(distance <= load(s.placed_at, WIDTH * (places - 1))) == 0:
+            continue
+        for p in range(min(n - j, places)):
+            other, whose = load(s.placed_at, WIDTH * p), load(s.placed, WIDTH * p)
+            nearer = distance <= other
+            store(s.placed, WIDTH * p, choose(nearer, number, whose))
+            store(s.placed_at, WIDTH * p, lesser(other, distance))
+            number, distance = choose(nearer, whose, number), greater(other, distance)
+
+
+@compiled
+def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
+    """Return where mate j was when last heard, and whether that is not forgotten."""
+    heard = Heard(*of_worlds(worlds.heard[:, nonnegative(observers.i), nonnegative(j)], observers, MESSAGE))
+    sent = counts(heard.step)
+    return heard.x, heard.y, (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
+
+
+@compiled
+def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View, p: int, now: bool, s: Record) -> Mate:
+    """Return the mate in a place of each observer; in an empty place, number -1 and the data of the first tracker."""
+    rows = (
+        _fields_of(worlds, observers, p, now, 0, s),
+        _fields_of(worlds, observers, p, now, 1, s),
+        _fields_of(worlds, observers, p, now, 2, s),
+        _fields_of(worlds, observers, p, now, 3, s),
+        _fields_of(worlds, observers, p, now, 4, s),
+        _fields_of(worlds, observers, p, now, 5, s),
+        _fields_of(worlds, observers, p, now, 6, s),
+        _fields_of(worlds, observers, p, now, 7, s),
+    )
+    fields = transpose(rows)
+    if now:
+        t, age = Pose(*fields), eight(ZERO)
+        x, y, cos, sin, speed, turn_rate = t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate
+    else:
+        h = Heard(*fields)
+        x, y, cos, sin, speed, turn_rate = h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate
+        age = (v.step - counts(h.step)) * c.control_step
+    distance, dx, dy = load(s.placed_at, WIDTH * p), x - v.x, y - v.y
+    ahead, left = ego(v, dx, dy)
+    apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
+    return Mate(
+        number=load(s.placed, WIDTH * p),
+        age=age,
+        dx=dx,
+        dy=dy,
+        distance=distance,
+        ahead=choose(apart, ahead * per_metre, ONE),
+        left=choose(apart, left * per_metre, ZERO),
+        heading_cos=cos,
+        heading_sin=sin,
+        speed=speed,
+        turn_rate=turn_rate,
+    )
+
+
+@compiled
+def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lane: int, s: Record) -> Lanes:
+    """Return eight fields of a lane's mate in a place: now, or as last heard."""
+    e, j = world_of(observers, lane), nonnegative(max(int(s.placed[WIDTH * p + lane]), 0))
+    if now:
+        return load_fields(worlds.tracker[e, j], POSE)
+    return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
+
+
+@out_of_line
+def _write_messages(
+    c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, rows: FloatArray
+) -> None:
+    """Write the messages of the listed mates: none in an empty place, and none to a target."""
+    size, i = nonnegative(made.mate_width + c.message_size), nonnegative(observers.i)
+    for lane in range(observers.number):
+        e = nonnegative(observers.e + lane)
+        for p in range(nonnegative(c.neighbours)):
+            number = int(s.placed[WIDTH * p + lane])
+            start = nonnegative(made.width + c.sonar_beams + p * size + made.mate_width)
+            for q in range(nonnegative(c.message_size)):
+                said = ZERO
+                if number >= 0 and i < c.num_trackers:
+                    j = nonnegative(number)
+                    said = worlds.message[e, 0, j, q] if c.perfect_radio != 0 else worlds.heard_message[e, i, j, q]
+                rows[lane, start + q] = said
+
+
+@compiled
+def write_block(columns: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
+    """Write eight columns, the first of them column ``first``, to rows (number of worlds, ...)."""
+    a, b, c, d, f, g, h, j = transpose(columns)
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, first, rows)
+    _write_row(b, 1, first, rows)
+    _write_row(c, 2, first, rows)
+    _write_row(d, 3, first, rows)
+    _write_row(f, 4, first, rows)
+    _write_row(g, 5, first, rows)
+    _write_row(h, 6, first, rows)
+    _write_row(j, 7, first, rows)
+
+
+@compiled
+def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
+    if lane < len(rows):
+        store(rows[lane], first, row)
+
+
+@compiled
+def write_column(column: Lanes, number: int, s: Record, rows: FloatArray) -> None:
+    """Write one column to rows (number of worlds, ...)."""
+    store(s.column, 0, column)
+    for lane in range(len(rows)):
+        rows[lane, number] = s.column[lane]

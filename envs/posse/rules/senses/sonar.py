@@ -101,7 +101,7 @@ def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: 
             if disc != number:
                 echo_of_disc(c, robot, disc, s)
             near &= near - 1
-    if c.walled and to_wall(c, x, y) < c.sonar_range + c.robot_radius:
+    if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
     for k in range(nonnegative(c.sonar_beams)):
         o[nonnegative(first + k)] = s.reading[k]

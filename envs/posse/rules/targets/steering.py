@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled, out_of_line
-from posse.rules.discs import obstacle_within, to_wall
+from posse.rules.discs import surroundings_within, to_wall
 from posse.rules.kinematics import arc, turn_towards
 
 _ROUNDING: Final = np.float32(1e-3)  # m, far more than the accumulated rounding of an episode
@@ -47,14 +47,6 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 
 
 @compiled
-def disc_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
-    """Return whether a disc is clear of walls and obstacles; one that contains an obstacle is not."""
-    if abs(x) + radius > c.half_width or abs(y) + radius > c.half_height:
-        return False
-    return not obstacle_within(obstacles, c.num_obstacles, x, y, radius)
-
-
-@compiled
 def free_circles(
     c: Record,
     obstacles: Records,
@@ -67,8 +59,8 @@ def free_circles(
     """Return whether the turning circles on the left and on the right are free, but for an allowance, m."""
     radius = c.target_speed / c.target_turn_rate
     aside_x, aside_y, room = radius * heading_sin, radius * heading_cos, radius - allowance + c.safe_distance
-    left = disc_is_free(c, obstacles, x - aside_x, y + aside_y, room)
-    return left, disc_is_free(c, obstacles, x + aside_x, y - aside_y, room)
+    left = not surroundings_within(c, obstacles, x - aside_x, y + aside_y, room)
+    return left, not surroundings_within(c, obstacles, x + aside_x, y - aside_y, room)
 
 
 @out_of_line
