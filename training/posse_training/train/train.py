@@ -195,9 +195,8 @@ class Run(BaseCallback):
         elif self.at.rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
         self.at.rollouts += 1
-        steps = self.settings.rollout if self.on_policy else 1
-        for name, total in self.env.take_terms().items():
-            self.logger.record_mean(f"reward/{name}", total / steps)
+        for name, mean in self.env.take_terms().items():
+            self.logger.record_mean(f"reward/{name}", mean)
 
     def finish(self) -> None:
         """Evaluate once more, and write the last policy and checkpoint."""
@@ -223,7 +222,7 @@ class Run(BaseCallback):
 
     def _checkpoint(self) -> None:
         state = {
-            "worlds": tensors_of(self.env.save()),
+            "worlds": tensors_of(self.env.arrays()),
             "statistics": tensors_of(self.statistics.save()),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
