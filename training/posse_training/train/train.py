@@ -16,7 +16,6 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
-from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, DivergedError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
@@ -153,7 +152,7 @@ class Run(BaseCallback):
         """
         try:
             self.env.restore(arrays_of(state["worlds"]))
-            self.statistics.restore(arrays_of(state["statistics"]))
+            self.statistics.restore(state["statistics"])
             checkpoint.restore_model(self.model, state["model"])
             checkpoint.restore_random_state(state["random"])
             self.at, self._saved_at = Progress(**state["progress"]), self.model.num_timesteps
@@ -223,7 +222,7 @@ class Run(BaseCallback):
     def _checkpoint(self) -> None:
         state = {
             "worlds": tensors_of(self.env.arrays()),
-            "statistics": tensors_of(self.statistics.save()),
+            "statistics": self.statistics.save(),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
             "progress": {**vars(self.at), "seconds": self._seconds},
@@ -233,7 +232,7 @@ class Run(BaseCallback):
 
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
-        write_atomically(self.folder / CURVE, checkpoint.as_csv(self.at.curve))
+        checkpoint.write_curve(self.folder / CURVE, self.at.curve)
         if name is not None:
             self._policy().save(self.folder / name)
 
