@@ -25,7 +25,7 @@ from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
+from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, read_settings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
 from posse_training.train.worlds import check_opponents, load_own, make_advising, make_env
@@ -79,7 +79,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         except ValueError as error:  # torch's distributions refuse numbers that are not finite
             run.check_finite(error)
             raise
-    return best_policy(folder)
+    return folder / BEST
 
 
 def resume(folder: Path, *, console: Console | None = None, steps: int | None = None) -> Path:
