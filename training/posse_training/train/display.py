@@ -53,10 +53,6 @@ class Display:
         """Print what the run is doing."""
         self._bar.console.print(text, markup=False, soft_wrap=True)
 
-    def copied(self, done: int, rounds: int, error: float) -> None:
-        """Print how many rounds of imitation are done, and the mean squared error of the last."""
-        self.note(f"copying {self._settings.imitate}: {done} of {rounds} rounds, squared error {error:.4f}")
-
     def begin(self, steps: int, total: int) -> None:
         """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
         if total != self._settings.steps:

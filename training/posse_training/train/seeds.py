@@ -7,9 +7,7 @@ worker died is resumed from its checkpoint by another one.
 from __future__ import annotations
 
 import contextlib
-import io
 import platform
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -68,20 +66,6 @@ def train_on_worker(settings: TrainSettings, where: Path) -> Path:
     if not where.is_dir():
         raise ClusterError(f"node {platform.node()} has no folder {where}: train on a file system that all nodes share")
     with contextlib.chdir(where):
-        console = Console(file=_Prefixed(f"seed {settings.seed}: "), width=100)
+        console = Console(width=100)
+        console.print(f"seed {settings.seed}: {settings.run_folder}", markup=False)
         return train(settings, console=console, num_threads=1)
-
-
-class _Prefixed(io.StringIO):
-    """Standard output, each line with a prefix: the driver shows those of all workers."""
-
-    def __init__(self, prefix: str) -> None:
-        super().__init__()
-        self._prefix = prefix
-
-    def write(self, text: str) -> int:
-        sys.stdout.writelines(f"{self._prefix}{line}\n" for line in text.splitlines() if line)
-        return len(text)
-
-    def flush(self) -> None:
-        sys.stdout.flush()

@@ -28,7 +28,7 @@ from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, read_settings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import check_opponents, load_own, make_advising, make_env
+from posse_training.train.worlds import load_own, make_advising, make_env, pairings
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -106,7 +106,7 @@ def check_before(settings: TrainSettings) -> None:
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
     make_advising(settings)
-    check_opponents(settings)
+    pairings(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             load_own(settings, policy)
@@ -142,7 +142,7 @@ class Run(BaseCallback):
         else:
             checkpoint.start_from(Path(s.start), self.model, self.statistics, s.log_deviation)
         if s.imitate is not None:
-            imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.copied)
+            imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.note)
 
     def restore(self, state: State) -> None:
         """Go back to where a checkpoint was written.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
 import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
@@ -25,45 +27,39 @@ class Pairing(NamedTuple):
     """With the opponent's target, or messages."""
     opponent: Policy | Target | None
     """A team's policy where the target learns, else a target; ``None``: the scenario's own target."""
-    share: int = 1
+    inside: dict[str, Any]
+    """The argument of :func:`posse.batches` that puts the opponent into the worlds, if it is a policy."""
+    share: int
     """How many parts of the worlds it gets."""
-
-
-def check_opponents(settings: TrainSettings) -> None:
-    """Raise if an opponent is unknown, or its memory cannot be saved, as resuming requires.
-
-    Raises:
-        PolicyError: The message names it.
-    """
-    for pairing in pairings(settings):
-        moved = pairing.opponent
-        policy = moved.policy if isinstance(moved, Target) else moved
-        if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
-            raise PolicyError(
-                f"{getattr(moved, 'name', '')!r} cannot be trained against: it reads the state of the worlds, or its "
-                "memory cannot be saved (it has no method arrays)"
-            )
 
 
 def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
     """Return every scenario with every opponent.
 
     Raises:
-        PolicyError: An unknown opponent, or one that does not move the other side.
+        PolicyError: An unknown opponent, one that does not move the other side, or one whose memory cannot be saved,
+            as resuming requires.
     """
     found: list[Pairing] = []
     for scenario in settings.given:
         if not settings.opponents:
-            found.append(Pairing(scenario, None))
+            found.append(Pairing(scenario, None, {}, 1))
         for name, share in settings.opponents.items():
+            opponent: Any
+            policy: Any
             if settings.side == TARGET:
-                policy = load(name)
+                opponent = policy = load(name)
                 size = max(scenario.message_size, policy.message_size)
-                faced = scenario.replace(target_motion="agent", message_size=size)
-                found.append(Pairing(faced, policy, share))
+                faced, argument = scenario.replace(target_motion="agent", message_size=size), "team_policy"
             else:
-                target = load_target(name)
-                found.append(Pairing(target.fit(scenario), target, share))
+                opponent = load_target(name)
+                faced, policy, argument = opponent.fit(scenario), opponent.policy, "target_policy"
+            if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
+                raise PolicyError(
+                    f"{name!r} cannot be trained against: it reads the state of the worlds, or its memory cannot be "
+                    "saved (it has no method arrays)"
+                )
+            found.append(Pairing(faced, opponent, {} if policy is None else {argument: policy}, share))
     return tuple(found)
 
 
@@ -101,23 +97,17 @@ def make_advising(settings: TrainSettings) -> Advising | None:
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
     """Return batches of worlds, divided among the pairings by their shares."""
     pairs = pairings(settings)
-    ends = [0]
-    for pair in pairs:
-        ends.append(ends[-1] + pair.share)
-    edges = [settings.num_worlds * end // ends[-1] for end in ends]
+    ends = np.cumsum([0, *(pair.share for pair in pairs)])
+    edges = (settings.num_worlds * ends // ends[-1]).tolist()
     if any(first == last for first, last in pairwise(edges)):
         raise SettingsError(
             f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
         )
     batches: list[posse.Batch] = []
     for pair, (first, last) in zip(pairs, pairwise(edges), strict=True):
-        scenario, inside = pair.scenario, dict[str, Any]()
+        scenario = pair.scenario
         if settings.end_on_contact:
             scenario = scenario.replace(terminate_on_contact=True)
-        if settings.side == TARGET:
-            inside = {"team_policy": pair.opponent}
-        elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
-            inside = {"target_policy": pair.opponent.policy}
         batches += posse.batches(
             scenario,
             last - first,
@@ -126,7 +116,7 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
             first_world=first,
             autoreset="disabled",
             num_threads=num_threads,
-            **inside,
+            **pair.inside,
         )
     return batches
 
