@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.runs import quiet, small
+from tests.support.runs import quiet, resume, small
 
 import posse
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.train import resume, train
+from posse_training.train.train import train
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -107,5 +107,5 @@ def test_nothing_is_made_before_settings_are_checked(
 def test_damaged_settings(tmp_path: Path, text: str) -> None:
     (tmp_path / "settings.json").write_text(text)
     with pytest.raises((SettingsError, posse.ScenarioError)):
-        resume(tmp_path, console=quiet())
+        resume(tmp_path)
     assert [file.name for file in tmp_path.iterdir()] == ["settings.json"]

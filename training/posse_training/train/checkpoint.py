@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -23,13 +23,10 @@ from posse_training.errors import CheckpointError
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import Point
 
-Arrays = Mapping[str, npt.NDArray[Any]]
 State = dict[str, Any]
 """Nested dictionaries of tensors and plain values."""
 
 CHECKPOINT: Final = "checkpoint.pt"
-POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "contact_free")
-"""Of the curve: agent steps, s, mean safe score and its 95 % interval, mean score, share of episodes."""
 _REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -44,10 +41,10 @@ class Progress:
     curve: list[Point] = field(default_factory=list)
 
 
-def write_curve(path: Path, curve: Iterable[Point]) -> None:
-    """Write a learning curve."""
+def write_curve(path: Path, curve: Sequence[Point]) -> None:
+    """Write a learning curve of one point or more."""
     with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, POINT)
+        writer = csv.DictWriter(file, curve[0])
         writer.writeheader()
         writer.writerows(curve)
 
@@ -105,7 +102,7 @@ def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics
             spread.fill_(log_deviation)
 
 
-def tensors_of(arrays: Arrays) -> dict[str, torch.Tensor]:
+def tensors_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, torch.Tensor]:
     """Return copies of arrays as tensors."""
     return {name: torch.from_numpy(np.array(array, order="C")) for name, array in arrays.items()}
 

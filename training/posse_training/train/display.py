@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import time
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -24,6 +24,7 @@ class Display:
         console: Where to show it.
 
     Attributes:
+        bar: To be entered while the run goes on.
         beside: Safe score of ``settings.beside`` on the same worlds, if known.
     """
 
@@ -31,7 +32,7 @@ class Display:
         self.beside: float | None = None
         self._settings = settings
         self._started, self._from_steps, self._steps = time.monotonic(), 0, 0
-        self._bar = Progress(
+        self.bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps{task.fields[state]}"),
@@ -40,31 +41,24 @@ class Display:
             transient=True,
             disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task(escape(settings.name), total=settings.steps, state="")
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        self._task = self.bar.add_task(escape(settings.name), total=settings.steps, state="")
 
     def note(self, text: str) -> None:
         """Print what the run is doing."""
-        self._bar.console.print(text, markup=False, soft_wrap=True)
+        self.bar.console.print(text, markup=False, soft_wrap=True)
 
     def begin(self, steps: int, total: int) -> None:
         """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
         if total != self._settings.steps:
             self.note(f"rollouts are completed: {total:,} steps in all")
         self._started, self._from_steps, self._steps = time.monotonic(), steps, steps
-        self._bar.reset(self._task, total=total, completed=steps)
+        self.bar.reset(self._task, total=total, completed=steps)
 
     def progress(self, steps: int, training_score: float | None) -> None:
         """Show the steps made, and the mean score of the latest training episodes."""
         self._steps = steps
         score = "" if training_score is None else f", training score {training_score:.3f}"
-        self._bar.update(self._task, completed=steps, state=score)
+        self.bar.update(self._task, completed=steps, state=score)
 
     def evaluated(self, point: Point) -> None:
         """Print results on the validation worlds, after as many steps as they say."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,13 +18,13 @@ from posse_baselines import load
 from posse_training.errors import CheckpointError, DivergedError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
-from posse_training.train.algorithms import ALGORITHMS, check_algorithm
+from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
 from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, read_settings
+from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
 from posse_training.train.worlds import load_own, make_advising, make_env, pairings
@@ -60,7 +59,8 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
-        display = stack.enter_context(Display(settings, console or Console()))
+        display = Display(settings, console or Console())
+        stack.enter_context(display.bar)
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
@@ -82,18 +82,6 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     return folder / BEST
 
 
-def resume(folder: Path, *, console: Console | None = None, steps: int | None = None) -> Path:
-    """Resume the training of a run folder; see :func:`train`.
-
-    Args:
-        folder: The run folder.
-        console: Where to show progress.
-        steps: Total steps to train for, instead of those that the run was started with.
-    """
-    settings = replace(read_settings(folder / SETTINGS), folder=folder)
-    return train(settings if steps is None else replace(settings, steps=steps), console=console)
-
-
 def steps_made(settings: TrainSettings, num_envs: int) -> int:
     """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
     at_once = num_envs * (settings.rollout if ALGORITHMS[settings.algorithm].on_policy else 1)
@@ -102,7 +90,6 @@ def steps_made(settings: TrainSettings, num_envs: int) -> int:
 
 def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
-    check_algorithm(settings)
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
     make_advising(settings)
@@ -132,7 +119,6 @@ class Run(BaseCallback):
         warm = settings.imitate is not None or settings.advise is not None
         self.at = Progress(next_evaluation=0 if warm else settings.evaluate_every)
         self._started = time.monotonic()
-        self._saved_at: int | None = None  # steps at the last checkpoint
 
     def begin(self) -> None:
         """Take what the model begins with: input statistics, another run's networks, a copy of a policy."""
@@ -155,7 +141,7 @@ class Run(BaseCallback):
             self.statistics.restore(state["statistics"])
             checkpoint.restore_model(self.model, state["model"])
             checkpoint.restore_random_state(state["random"])
-            self.at, self._saved_at = Progress(**state["progress"]), self.model.num_timesteps
+            self.at = Progress(**state["progress"])
             self._started -= self.at.seconds
         except Exception as error:  # whatever a state of other settings raises
             raise CheckpointError(
@@ -228,7 +214,6 @@ class Run(BaseCallback):
             "progress": {**vars(self.at), "seconds": self._seconds},
         }
         checkpoint.write_checkpoint(self.folder, state)
-        self._saved_at = self.model.num_timesteps
 
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
@@ -255,18 +240,12 @@ class Run(BaseCallback):
         """Raise where the networks hold numbers that are not finite, before these are evaluated or saved.
 
         Raises:
-            DivergedError: The message says what is kept.
+            DivergedError: The message says what to do.
         """
         if all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
             return
-        kept = "nothing was saved before"
-        if self._saved_at is not None:
-            kept = f"the checkpoint at {self._saved_at:,} steps is kept"
-            if self.at.curve:
-                best = max(self.at.curve, key=lambda point: point["safe_score"])
-                kept += f", and {BEST} of {int(best['steps']):,} steps"
         raise DivergedError(
-            f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
-            f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
-            "train again in another --out"
+            f"the training diverged at {self.model.num_timesteps:,} steps: its networks give numbers that are not "
+            f"finite; the checkpoint and {BEST} of before are kept, if there are any. Lower --learning-rate, or "
+            "--log-deviation, and train again in another --out"
         ) from cause

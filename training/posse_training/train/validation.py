@@ -13,7 +13,7 @@ from posse_training.evaluation.statistics import mean
 from posse_training.train.display import Display
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import TARGET, load_own, make_env, pairings
+from posse_training.train.worlds import load_own, make_env, pairings
 
 VALIDATION_SEED: Final = 0
 _WARM_WORLDS: Final = 32
@@ -60,7 +60,7 @@ def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
     for pair in pairings(settings):
         team: Any = policy
         target: Any = pair.opponent
-        if settings.side == TARGET:
+        if settings.side == "target":
             team, target = pair.opponent, policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
         results = evaluate(
             team,
@@ -73,7 +73,7 @@ def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
         )
         denied = 1 - results["score"]
         for name, parts in played.items():
-            parts.append(denied if settings.side == TARGET and name != "contact_free" else results[name])
+            parts.append(denied if settings.side == "target" and name != "contact_free" else results[name])
     columns = {name: np.concatenate(parts) for name, parts in played.items()}
     safe = mean(columns["safe_score"])
     return {

@@ -17,8 +17,6 @@ from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import TeamVecEnv
 
-TARGET = "target"
-
 
 class Pairing(NamedTuple):
     """A scenario and an opponent."""
@@ -47,7 +45,7 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
         for name, share in settings.opponents.items():
             opponent: Any
             policy: Any
-            if settings.side == TARGET:
+            if settings.side == "target":
                 opponent = policy = load(name)
                 size = max(scenario.message_size, policy.message_size)
                 faced, argument = scenario.replace(target_motion="agent", message_size=size), "team_policy"
@@ -71,7 +69,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
     """
     batches = _make_batches(settings, num_threads)
     layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
-    if settings.side == TARGET:  # it hears no messages
+    if settings.side == "target":  # it hears no messages
         layout = ObservationLayout(layout.scenario.replace(message_size=0))
     encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
     return TeamVecEnv(
@@ -127,4 +125,4 @@ def load_own(settings: TrainSettings, name: str) -> Any:
     Raises:
         PolicyError: It is unknown.
     """
-    return load_target(name) if settings.side == TARGET else load(name)
+    return load_target(name) if settings.side == "target" else load(name)
