@@ -99,10 +99,11 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
         return [train(settings) for settings in runs]
     with connected(ray, log=True):
         results = dict(on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs]))
-    for result in results.values():
-        if isinstance(result, Exception):
-            raise result
-    return [results[k] for k in range(len(runs))]
+    paths = [results[k] for k in range(len(runs))]
+    for path in paths:
+        if isinstance(path, Exception):
+            raise path
+    return paths
 
 
 def train_on_worker(settings: TrainSettings, where: Path) -> Path:

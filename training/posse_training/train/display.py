@@ -31,7 +31,7 @@ class Display:
     def __init__(self, settings: TrainSettings, console: Console) -> None:
         self.beside: float | None = None
         self._settings = settings
-        self._started, self._from_steps, self._steps = time.monotonic(), 0, 0
+        self._started, self._from_steps = time.monotonic(), 0
         self.bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -51,12 +51,11 @@ class Display:
         """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
         if total != self._settings.steps:
             self.note(f"rollouts are completed: {total:,} steps in all")
-        self._started, self._from_steps, self._steps = time.monotonic(), steps, steps
+        self._started, self._from_steps = time.monotonic(), steps
         self.bar.reset(self._task, total=total, completed=steps)
 
     def progress(self, steps: int, training_score: float | None) -> None:
         """Show the steps made, and the mean score of the latest training episodes."""
-        self._steps = steps
         score = "" if training_score is None else f", training score {training_score:.3f}"
         self.bar.update(self._task, completed=steps, state=score)
 
@@ -69,7 +68,7 @@ class Display:
         )
         if self.beside is not None:
             line += f", {self._settings.beside} {self.beside:.3f}"
-        made = self._steps - self._from_steps
+        made = point["steps"] - self._from_steps
         rate = f", {made / (time.monotonic() - self._started):,.0f} steps/s" if made else ""
         self.note(line + rate)
 

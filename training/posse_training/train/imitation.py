@@ -19,11 +19,12 @@ from torch.nn.functional import mse_loss
 import posse
 from posse import Scenario
 from posse.numeric import FloatArray
-from posse_baselines.learned import Encoder, Encoding
+from posse_baselines.learned import Encoding
 from posse_baselines.policy import Policy, begin
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
+from posse_training.train.vec_env import SlotGroup
 from posse_training.train.world_state import StateWriter
 
 WORLDS: Final = 64
@@ -117,17 +118,13 @@ def _play_round(
     parts, worlds, trackers = 2 + settings.message_size, len(by_expert), scenario.num_trackers
     longest = max(settings.message_size, expert.message_size)
     batch = posse.Batch(scenario.replace(message_size=longest), worlds, seed=settings.seed, first_world=first_world)
-    encoder = Encoder(encoding, batch.layout)
     state = StateWriter(batch, settings.scenarios) if ALGORITHMS[settings.algorithm].reads_state else None
-    size = encoding.size + (state.size if state else 0)
+    slots = SlotGroup(batch, encoding, state)
     observations = batch.reset()
     memory = begin(expert, batch)
     inputs, chosen, rewards = [], [], []
     for _ in range(scenario.horizon):
-        x = np.empty((worlds * trackers, size), np.float32)
-        encoder.encode(observations, x)
-        if state:
-            state.write(x[:, encoding.size :])
+        x = slots.encode(observations)
         wanted, memory = expert.act(observations, memory)
         actions = wanted.copy()
         if not by_expert.all():

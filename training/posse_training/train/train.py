@@ -190,16 +190,19 @@ class Run(BaseCallback):
         self.check_finite()
         if not self.at.curve or self.at.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
-        self._write(LAST)
+        self._policy().save(self.folder / LAST)
         self._checkpoint()
 
     def _evaluate(self) -> None:
         """Evaluate on the validation worlds; keep the policy if it is the best so far."""
-        steps, seconds = self.model.num_timesteps, self._seconds
-        point = {"steps": float(steps), "seconds": seconds, **validate(self.settings, self._policy())}
+        steps = self.model.num_timesteps
+        point = {"steps": float(steps), "seconds": time.monotonic() - self._started}
+        point |= validate(self.settings, self._policy())
         best = max((earlier["safe_score"] for earlier in self.at.curve), default=-1.0)
         self.at.curve.append(point)
-        self._write(BEST if point["safe_score"] > best else None)
+        checkpoint.write_curve(self.folder / CURVE, self.at.curve)
+        if point["safe_score"] > best:
+            self._policy().save(self.folder / BEST)
         for name in ("safe_score", "score", "contact_free"):
             self.logger.record(f"validation/{name}", point[name])
         self.logger.dump(steps)  # now, so that they are logged at the step that they belong to
@@ -211,15 +214,9 @@ class Run(BaseCallback):
             "statistics": self.statistics.save(),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
-            "progress": {**vars(self.at), "seconds": self._seconds},
+            "progress": {**vars(self.at), "seconds": time.monotonic() - self._started},
         }
         checkpoint.write_checkpoint(self.folder, state)
-
-    def _write(self, name: str | None) -> None:
-        """Write the curve, and the policy under a name if there is one."""
-        checkpoint.write_curve(self.folder / CURVE, self.at.curve)
-        if name is not None:
-            self._policy().save(self.folder / name)
 
     def _policy(self) -> Any:
         card = make_card(self.settings, steps=self.model.num_timesteps, curve=self.at.curve)
@@ -231,10 +228,6 @@ class Run(BaseCallback):
         if score is not None:
             self.logger.record("training/score", score)
         self.display.progress(self.model.num_timesteps, score)
-
-    @property
-    def _seconds(self) -> float:
-        return time.monotonic() - self._started
 
     def check_finite(self, cause: Exception | None = None) -> None:
         """Raise where the networks hold numbers that are not finite, before these are evaluated or saved.

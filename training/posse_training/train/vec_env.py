@@ -73,8 +73,7 @@ class TeamVecEnv(VecEnv):
         scenarios = [batch.scenario for batch in batches]
         states = [StateWriter(batch, scenarios) if see_state else None for batch in batches]
         self._groups = [
-            _SlotGroup(batch, encoding, advising, safeguard, state)
-            for batch, state in zip(batches, states, strict=True)
+            SlotGroup(batch, encoding, state, advising, safeguard) for batch, state in zip(batches, states, strict=True)
         ]
         self._owners = [batch for batch in batches for _ in range(batch.num_worlds * batch.action_shape[1])]
         self.private_size, self.size = self._groups[0].private_size, self._groups[0].size
@@ -182,11 +181,16 @@ def _action_length(batches: Sequence[Batch]) -> int:
     return lengths.pop()
 
 
-class _SlotGroup:
+class SlotGroup:
     """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e."""
 
     def __init__(
-        self, batch: Batch, encoding: Encoding, advising: Advising | None, safeguard: bool, state: StateWriter | None
+        self,
+        batch: Batch,
+        encoding: Encoding,
+        state: StateWriter | None,
+        advising: Advising | None = None,
+        safeguard: bool = False,
     ) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
@@ -213,7 +217,7 @@ class _SlotGroup:
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
         self._begin(raw, np.ones(worlds, np.bool_))
         self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
-        return self._encode(raw)
+        return self.encode(raw)
 
     def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
@@ -245,9 +249,9 @@ class _SlotGroup:
             raw = batch.reset(options={"reset_mask": ended})
             self._begin(raw, ended)
         terms = {name: told[f"reward/{name}"] for name in batch.term_names}
-        return self._encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
+        return self.encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
 
-    def _encode(self, raw: FloatArray, worlds: Any = slice(None)) -> FloatArray:
+    def encode(self, raw: FloatArray, worlds: Any = slice(None)) -> FloatArray:
         """Return the observations (slots, size) of all slots, or of those of some worlds."""
         seen = raw[worlds]
         out = np.empty((seen.shape[0] * seen.shape[1], self.size), np.float32)
@@ -265,7 +269,7 @@ class _SlotGroup:
         """Fill the infos of worlds whose episodes ended; ``over``: not by shortening."""
         trackers, horizon = self.batch.action_shape[1], self.batch.scenario.horizon
         worlds = np.flatnonzero(ended)
-        final = self._encode(raw, worlds)
+        final = self.encode(raw, worlds)
         metrics = self.batch.metrics()
         steps = self.batch.worlds["step"]
         # A target's score is what it denies the team.
