@@ -29,12 +29,12 @@ __all__ = ["ModelPolicy", "TeamVecEnv", "from_sb3"]
 
 
 class ModelPolicy(BasePolicy):
-    """A policy that plays what a stable-baselines3 model has learned, by the mode of its distribution.
+    """A policy that plays what a stable-baselines3 model has learned.
 
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
     :class:`posse_training.sb3.TeamVecEnv`, plays every tracker of the team; one of (N, F), as in
     ``posse/Team-v0``, the whole team. Discrete actions are understood too, and so are recurrent
-    policies: their states restart with the episode.
+    policies: their states restart with the episode. Actions are the mode of the model's distribution.
 
     Args:
         model: A model; one from a file is ``PPO.load(path)``, by the class of its algorithm.
