@@ -14,7 +14,7 @@ import posse
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
-from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.algorithms import ALGORITHMS, check_algorithm
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -38,8 +38,6 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ({"hidden": (0,)}, "hidden=.* is invalid: it must be whole numbers of at least 1"),
         ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
         ({"safeguard": True, "advise": "ddcs-tuned"}, "safeguard=True goes with neither advise"),
-        ({"imitate": "pursuit", "algorithm": "sac"}, "needs algorithm ppo or mappo, not sac: leave it out"),
-        ({"algorithm": "dqn"}, "unknown algorithm 'dqn'; algorithms are: ppo"),
         ({"overrides": [1]}, r"overrides=\[1\]"),
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
         ({"overrides": {"message_size": 3}}, "use the setting message_size"),
@@ -58,6 +56,18 @@ def test_the_preset_nothing_learns_from_random_weights_on_every_scenario() -> No
         assert replace(found, scenario="smart") == default_settings("smart", preset="nothing")
     assert default_settings("smart") == default_settings("smart", preset="nothing")
     assert default_settings("smart", preset="residual").advise == "ddcs-tuned"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"imitate": "pursuit", "algorithm": "sac"}, "needs algorithm ppo or mappo, not sac: leave it out"),
+        ({"algorithm": "dqn"}, "unknown algorithm 'dqn'; algorithms are: ppo"),
+    ],
+)
+def test_what_an_algorithm_cannot_do(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        check_algorithm(replace(TrainSettings(), **changes))
 
 
 @pytest.mark.parametrize(

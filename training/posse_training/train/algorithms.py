@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from posse_training.errors import SettingsError
+from posse_training.train.settings import TrainSettings
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
     from torch import nn
 
-    from posse_training.train.settings import TrainSettings
     from posse_training.train.vec_env import TeamVecEnv
 
 _ADAM_EPSILON: Final = 1e-5  # the default of stable-baselines3's PPO
@@ -161,6 +161,19 @@ def algorithm_of(name: str) -> Algorithm:
     if name not in ALGORITHMS:
         raise SettingsError(f"unknown algorithm {name!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
     return ALGORITHMS[name]
+
+
+def check_algorithm(settings: TrainSettings) -> None:
+    """Raise if the algorithm is unknown, or cannot learn with these settings.
+
+    Raises:
+        SettingsError: The message names the setting.
+    """
+    name, kind = settings.algorithm, algorithm_of(settings.algorithm)
+    if settings.imitate is not None and not kind.on_policy:
+        raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
+    if settings.side == "target" and kind.reads_state:
+        raise SettingsError(f"algorithm={name!r} does not go with side='target', which observes everything: use ppo")
 
 
 def even_minibatch(rows: int, wanted: int) -> int:

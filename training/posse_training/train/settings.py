@@ -19,7 +19,6 @@ from posse_baselines.fields import number, optional
 from posse_training.errors import SettingsError, check_settings
 from posse_training.files import read_json
 from posse_training.options import Changes, MaybeNames, Names, Pairs
-from posse_training.train.algorithms import algorithm_of
 
 Point = dict[str, float]
 """Of a learning curve, by the columns of ``curve.csv``: agent steps, s, mean safe score and its 95 % interval, mean
@@ -237,11 +236,6 @@ def _misfits(s: TrainSettings) -> Iterator[str]:
 
 def _conflicts(s: TrainSettings) -> Iterator[str]:
     """Yield why settings that are valid on their own exclude each other."""
-    algorithm = algorithm_of(s.algorithm)
-    if s.imitate is not None and not algorithm.on_policy:
-        yield f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
-    if s.side == "target" and algorithm.reads_state:
-        yield f"algorithm={s.algorithm!r} does not go with side='target', which observes everything: use ppo"
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
         yield (
             f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}, where it "

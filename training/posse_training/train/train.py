@@ -18,7 +18,7 @@ from posse_baselines import load
 from posse_training.errors import CheckpointError, DivergedError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
-from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.algorithms import ALGORITHMS, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
 from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
@@ -92,6 +92,7 @@ def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
+    check_algorithm(settings)
     make_advising(settings)
     pairings(settings)
     for policy in (settings.imitate, settings.beside):
