@@ -14,8 +14,9 @@ import torch
 from rich.console import Console
 from safetensors.torch import load_file
 
-from posse_training.train import TrainSettings
+from posse_training.train import TrainSettings, read_settings
 from posse_training.train.checkpoint import read_checkpoint
+from posse_training.train.train import train
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "sac", "td3")
@@ -54,6 +55,11 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
 
 def quiet() -> Console:
     return Console(file=StringIO())
+
+
+def resume(folder: Path, **changes: Any) -> None:
+    """Train with the settings of a run folder."""
+    train(replace(read_settings(folder / "settings.json"), folder=folder, **changes), console=quiet())
 
 
 def numbers(folder: Path) -> dict[str, Any]:

@@ -6,9 +6,7 @@ import importlib
 import importlib.util
 import traceback
 from pathlib import Path
-from typing import Any, Final
-
-_LONGEST: Final = 300  # characters of an error in a summary
+from typing import Any
 
 
 class UserError(Exception):
@@ -85,11 +83,8 @@ def describe(error: BaseException) -> str:
     """Return an error in one line: its message, and where in the policy's code it was raised."""
     if isinstance(error, PlayError):
         return str(error)
-    message = " ".join(str(error).split())
-    if len(message) > _LONGEST:
-        message = f"{message[:_LONGEST]}..."
     found = [importlib.util.find_spec(name) for name in ("posse", "posse_baselines", "posse_training")]
     ours = tuple(str(Path(spec.origin).parent) for spec in found if spec is not None and spec.origin)
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
     where = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {message}{where}"
+    return f"{type(error).__name__}: {' '.join(str(error).split()):.300}{where}"

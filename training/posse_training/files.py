@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.files import read_json, refuse_link, remove_unfinished, write_atomically
+from posse_baselines.files import read_json, remove_unfinished, write_atomically
 from posse_training.errors import RunFolderError
 
 try:
@@ -17,11 +17,9 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["LOCK", "check_held", "check_new", "hold_settings", "locked", "read_json"]
+__all__ = ["check_held", "check_new", "hold_settings", "locked", "read_json"]
 
-LOCK: Final = "lock"
-"""Name of the lock file in a folder."""
-_LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+_LOCK: Final = "lock"
 
 
 @contextlib.contextmanager
@@ -33,18 +31,15 @@ def locked(folder: Path) -> Iterator[None]:
 
     Raises:
         RunFolderError: Another process holds it; the message has its number.
-        OSError: The folder cannot be written to, or contains a symbolic link, through which a write would land
-            elsewhere; it names the file.
+        OSError: The folder cannot be written to.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for inside in folder.iterdir():
-        refuse_link(inside)
-    with os.fdopen(os.open(folder / LOCK, _LOCK_FLAGS, 0o666), "r+", encoding="utf-8") as file:
+    with (folder / _LOCK).open("a+", encoding="utf-8") as file:
         if fcntl is not None:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
-                holder = file.read().strip() or "unknown"
+                holder = (folder / _LOCK).read_text(encoding="utf-8").strip() or "unknown"
                 raise RunFolderError(
                     f"{folder} is in use by process {holder}: wait for it, stop it, or choose another --out"
                 ) from error

@@ -6,7 +6,7 @@ is the file or folder that is written to, ``--steps`` and ``--minutes`` say how 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final
 
@@ -56,38 +56,37 @@ def words_of(settings: Mapping[str, Any]) -> list[str]:
     ]
 
 
-Pairs = Annotated[
-    dict[str, Any],
-    PrimitiveConstructorSpec(
-        nargs="*",
-        metavar="KEY=VALUE ...",
-        instance_from_str=settings_of,
-        is_instance=lambda value: isinstance(value, dict),
-        str_from_instance=words_of,
-    ),
-]
+def _words(
+    types: type | tuple[type, ...],
+    read: Callable[[list[str]], Any],
+    write: Callable[[Any], list[str]],
+    metavar: str,
+    nargs: Any = "*",  # tyro also takes "+", which its types do not say
+) -> PrimitiveConstructorSpec[Any]:
+    """Return how an option of some types is read from several words, and written as a default."""
+    return PrimitiveConstructorSpec(
+        nargs=nargs,
+        metavar=metavar,
+        instance_from_str=read,
+        is_instance=lambda value: isinstance(value, types),
+        str_from_instance=write,
+    )
+
+
+Pairs = Annotated[dict[str, Any], _words(dict, settings_of, words_of, "KEY=VALUE ...")]
 """Type of an option that takes ``KEY=VALUE ...``."""
 Changes = Annotated[Pairs, tyro.conf.arg(name="set")]
 """Type of the option ``--set``."""
-Names = Annotated[
-    str,
-    PrimitiveConstructorSpec(
-        nargs="+",
-        metavar="NAME ...",
-        instance_from_str=",".join,
-        is_instance=lambda value: isinstance(value, str),
-        str_from_instance=lambda value: value.split(","),
-    ),
-]
+Names = Annotated[str, _words(str, ",".join, lambda names: names.split(","), "NAME ...", "+")]
 """Type of an option that takes one name or several; in Python a text with commas between."""
 MaybeNames = Annotated[
     str | None,
-    PrimitiveConstructorSpec(
-        nargs="+",
-        metavar="NAME ...",
-        instance_from_str=lambda words: None if words == ["None"] else ",".join(words),
-        is_instance=lambda value: value is None or isinstance(value, str),
-        str_from_instance=lambda value: ["None"] if value is None else value.split(","),
+    _words(
+        (str, type(None)),
+        lambda words: None if words == ["None"] else ",".join(words),
+        lambda names: str(names).split(","),
+        "NAME ...",
+        "+",
     ),
 ]
 """Type of an option that takes one name or several, or none."""
@@ -104,16 +103,7 @@ def _address(words: Sequence[str]) -> bool | str:
     return words[0] if words else True
 
 
-Ray = Annotated[
-    bool | str,
-    PrimitiveConstructorSpec(
-        nargs="*",
-        metavar="[ADDRESS]",
-        instance_from_str=_address,
-        is_instance=lambda value: isinstance(value, (bool, str)),
-        str_from_instance=lambda value: [str(value)],
-    ),
-]
+Ray = Annotated[bool | str, _words((bool, str), _address, lambda value: [str(value)], "[ADDRESS]")]
 """Type of the option ``--ray``: with an address or without; ``False``: left out."""
 
 

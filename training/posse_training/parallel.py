@@ -196,9 +196,7 @@ class Job(NamedTuple):
 
 
 @contextlib.contextmanager
-def gathered(
-    jobs: Sequence[Job], ray: bool | str, done: Callable[[range], object] = lambda shard: None
-) -> Iterator[list[Arrays | Exception]]:
+def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -> Iterator[list[Arrays | Exception]]:
     """Do all jobs at once on a Ray cluster; give the joined arrays of each, or the exception that ended it.
 
     Each finished shard is a file, where the same jobs find it again after an interruption. The files are removed when
@@ -207,7 +205,7 @@ def gathered(
     Args:
         jobs: The jobs.
         ray: See :func:`connected`.
-        done: Is called with each shard that is done or was found.
+        done: Is called after each shard that is done or was found.
 
     Raises:
         MissingExtraError: Ray is not installed.
@@ -222,8 +220,8 @@ def gathered(
         for job, folder in zip(jobs, folders, strict=True):
             files = {shard: folder / f"{shard.start}-{shard.stop}.npz" for shard in job.shards}
             parts.append({shard: dict(np.load(file)) for shard, file in files.items() if file.exists()})
-            for shard in parts[-1]:
-                done(shard)
+            for _ in parts[-1]:
+                done()
         calls = [(k, shard) for k, job in enumerate(jobs) for shard in job.shards if shard not in parts[k]]
         sent = [cluster.put((job.function, job.arguments)) for job in jobs]  # to each node once, not with each shard
         failed: dict[int, Exception] = {}
@@ -241,7 +239,7 @@ def gathered(
                 np.savez(content, allow_pickle=False, **result)
                 folders[k].mkdir(parents=True, exist_ok=True)
                 write_atomically(folders[k] / f"{shard.start}-{shard.stop}.npz", content.getvalue())
-                done(shard)
+                done()
     yield [failed.get(k) or joined([parts[k][shard] for shard in job.shards]) for k, job in enumerate(jobs)]
     for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)

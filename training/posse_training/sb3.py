@@ -34,7 +34,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
     :class:`posse_training.sb3.TeamVecEnv`, plays every tracker of the team; one of (N, F), as in
     ``posse/Team-v0``, the whole team. Discrete actions are understood too, and so are recurrent
-    policies: their states restart with the episode.
+    policies: their states restart with the episode. Actions are the mode of the model's distribution.
 
     Args:
         model: A model; one from a file is ``PPO.load(path)``, by the class of its algorithm.
@@ -45,7 +45,6 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         encoding: How observations were encoded for it, where it learned in ``TeamVecEnv``.
         normalize: The wrapper whose statistics it learned with, if any.
         safeguard: Whether it learned behind the safeguard, as in ``TeamVecEnv(..., safeguard=True)``.
-        deterministic: Whether it plays the mode of its distribution.
 
     Raises:
         PolicyError: Spaces that no environment of posse has.
@@ -60,7 +59,6 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         encoding: Encoding | None = None,
         normalize: VecNormalize | None = None,
         safeguard: bool = False,
-        deterministic: bool = True,
     ) -> None:
         self.model = model
         self.name = name or type(model).__name__
@@ -68,7 +66,6 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         self._encoding = encoding
         self._normalize = normalize
         self._safeguard = safeguard
-        self._deterministic = deterministic
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
             raise PolicyError(
@@ -117,7 +114,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         rows = seen if self._whole_team else seen.reshape(worlds * trackers, -1)
         if self._normalize is not None:
             rows = np.asarray(self._normalize.normalize_obs(rows))
-        chosen, states = self.model.predict(rows, state=states, episode_start=begins, deterministic=self._deterministic)
+        chosen, states = self.model.predict(rows, state=states, episode_start=begins, deterministic=True)
         motions = MOTIONS[chosen] if self._discrete else np.clip(chosen, -1, 1)
         motions = motions.reshape(worlds, trackers, -1)
         actions = np.zeros((worlds, trackers, 2 + layout.scenario.message_size), np.float32)

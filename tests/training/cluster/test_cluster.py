@@ -12,9 +12,9 @@ from tests.support.process import printed
 from posse_baselines import from_function, load
 from posse_training import evaluate, provenance
 from posse_training.cli import main
+from posse_training.commands.train import train_on_worker
 from posse_training.errors import ClusterError, MissingExtraError
 from posse_training.parallel import Job, cut
-from posse_training.train.seeds import train_on_worker
 from posse_training.train.settings import TrainSettings
 
 COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seed 1 2 --ray", "tune pngl-l-phi --ray")

@@ -100,7 +100,7 @@ def test_imitation_copies(tmp_path: Path) -> None:
     model = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []
     statistics = RunningStatistics(env.private_size)
-    imitate(model, settings, env.encoding, _Circle(), statistics, lambda k, n, e: errors.append(e))
+    imitate(model, settings, env.encoding, _Circle(), statistics, lambda line: errors.append(float(line.split()[-1])))
     assert len(errors) == 4
     assert errors[-1] < 0.02
     policy = export(model, settings, env.encoding, {})

@@ -20,9 +20,11 @@ HORIZON = 12
 
 
 def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> TeamVecEnv:
-    values = {"horizon": HORIZON, "settle_time": 0.5, **settings}
-    batch = posse.batch("constant", worlds, seed=5, autoreset="disabled", **values)
-    return TeamVecEnv([batch], Encoding.of(batch.layout), staggered=staggered, see_state=see_state)
+    """One batch, or a batch for each world, whose first episodes are not shortened."""
+    values = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5, "autoreset": "disabled", **settings}
+    parts = [(0, worlds)] if staggered else [(first, 1) for first in range(worlds)]
+    batches = [posse.batch("constant", count, first_world=first, **values) for first, count in parts]
+    return TeamVecEnv(batches, Encoding.of(batches[0].layout), see_state=see_state)
 
 
 def move(env: TeamVecEnv, actions: Any) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
@@ -66,19 +68,20 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
 
 def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5}
-    batches = [posse.batch("smart", 3, autoreset="disabled", **settings) for _ in range(2)]
-    env = TeamVecEnv([batches[0]], Encoding.of(batches[0].layout), safeguard=True, staggered=False)
-    guard = Guard(batches[1].layout, 3)
+    batches = [posse.batch("smart", 1, first_world=e, autoreset="disabled", **settings) for e in range(3)]
+    env = TeamVecEnv(batches, Encoding.of(batches[0].layout), safeguard=True)
+    bare = posse.batch("smart", 3, autoreset="disabled", **settings)
+    guard = Guard(bare.layout, 3)
     env.reset()
-    seen = batches[1].reset()
+    seen = bare.reset()
     generator = np.random.default_rng(1)
     for _ in range(2 * HORIZON):
         wanted = draw(env, generator)
         observations, _, dones, _ = move(env, wanted)
         guard.follow(seen)
-        seen, *_ = batches[1].step(guard.actions(wanted.reshape(3, 5, 2)))
+        seen, *_ = bare.step(guard.actions(wanted.reshape(3, 5, 2)))
         if dones.any():
-            seen = batches[1].reset(options={"reset_mask": np.ones(3, np.bool_)})
+            seen = bare.reset(options={"reset_mask": np.ones(3, np.bool_)})
             guard.restart(np.ones(3, np.bool_))
         np.testing.assert_array_equal(observations.reshape(3, 5, -1), seen)
 
@@ -88,12 +91,11 @@ def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
     env.reset()
     told: list[dict[str, Any]] = []
     forward = np.tile(np.array([1.0, 0.3], np.float32), (env.num_envs, 1))
-    for _ in range(400):
+    for _ in range(399):  # one less than an episode
         _, _, _, infos = move(env, forward)
         told += [info for info in infos if "terminal_observation" in info]
-    ended = [info for info in told if info["episode"]["l"] < 400]
-    assert ended
-    assert not any(info["TimeLimit.truncated"] for info in ended)
+    assert told
+    assert not any(info["TimeLimit.truncated"] for info in told)
 
 
 def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
@@ -147,30 +149,29 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     finals = np.stack([info["terminal_observation"] for info in infos])
     assert finals[:, time_left] == pytest.approx(0)
     # Each tracker comes first in its own copy, the others follow by number.
-    w, t = env.batches[0].worlds, env.batches[0].arrays.tracker
+    w, t = env.batches[1].worlds, env.batches[1].arrays.tracker
     for i in (0, 3):
-        dx, dy = t["x"][1, i] - w["x"][1], t["y"][1, i] - w["y"][1]
-        ahead = dx * w["frame_cos"][1] + dy * w["frame_sin"][1]
+        dx, dy = t["x"][0, i] - w["x"][0], t["y"][0, i] - w["y"][0]
+        ahead = dx * w["frame_cos"][0] + dy * w["frame_sin"][0]
         assert observations[5 + i, env.private_size + 6] == pytest.approx(ahead, rel=1e-5)
         other = observations[5 + (i + 4) % 5]
         assert other[env.private_size + 6 + 11] == pytest.approx(ahead, rel=1e-5)
 
 
-class TestMethods:
-    @pytest.mark.parametrize(
-        ("batches", "message"),
-        [
-            ([], "no batches given"),
-            ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
-            ([{"autoreset": "disabled", "target_motion": "agent"}], "the target"),
-            ([{"autoreset": "disabled"}, {"autoreset": "disabled", "message_size": 1}], "different lengths"),
-        ],
-    )
-    def test_invalid_batches_are_refused(self, batches: list[dict[str, Any]], message: str) -> None:
-        made = [posse.batch("constant", 1, **settings) for settings in batches]
-        layout = posse.ObservationLayout(posse.get_scenario("constant"))
-        with pytest.raises(ValueError, match=message):
-            TeamVecEnv(made, Encoding.of(layout))
+@pytest.mark.parametrize(
+    ("batches", "message"),
+    [
+        ([], r"one length, these have \[\]"),
+        ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
+        ([{"target_motion": "agent"}], "the target"),
+        ([{}, {"message_size": 1}], r"one length, these have \[2, 3\]"),
+    ],
+)
+def test_invalid_batches_are_refused(batches: list[dict[str, Any]], message: str) -> None:
+    made = [posse.batch("constant", 1, **{"autoreset": "disabled", **settings}) for settings in batches]
+    layout = posse.ObservationLayout(posse.get_scenario("constant"))
+    with pytest.raises(ValueError, match=message):
+        TeamVecEnv(made, Encoding.of(layout))
 
 
 class _Recorder(BaseCallback):

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 
@@ -16,10 +15,8 @@ from posse_training import evaluate
 from posse_training.errors import CheckpointError, SettingsError
 from posse_training.train import TrainSettings
 from posse_training.train.train import train
-from posse_training.train.validation import play_all
+from posse_training.train.validation import validate
 from posse_training.train.worlds import make_env
-
-SPLIT = "validation"
 
 
 def target_run(folder: Path, **changes: Any) -> TrainSettings:
@@ -41,10 +38,10 @@ def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
 def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
     settings = target_run(tmp_path, team="ddcs-distributed", evaluate_worlds=4)
     smart = load_target("smart")
-    (denied,) = play_all(settings, smart, 0, SPLIT)
+    denied = validate(settings, smart)
     scenario = settings.scenarios[0]
-    played = evaluate("ddcs-distributed", scenario, 4, 0, split=SPLIT, progress=False)
-    np.testing.assert_allclose(denied["score"], 1 - played["score"])
+    played = evaluate("ddcs-distributed", scenario, 4, 0, split="validation", progress=False)
+    assert denied["score"] == denied["safe_score"] == pytest.approx(1 - played["score"].mean())
 
 
 def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import platform
 import shlex
 import sys
 from collections.abc import Sequence
@@ -10,11 +12,14 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from rich.console import Console
 
-from posse_training.errors import require
+from posse_training.errors import ClusterError, SettingsError, require
+from posse_training.files import check_held
 from posse_training.options import Names, Ray
+from posse_training.parallel import connected, on_ray
 from posse_training.train.presets import Preset, default_settings
-from posse_training.train.settings import SETTINGS, TrainSettings, read_settings
+from posse_training.train.settings import FREE, SETTINGS, TrainSettings, read_settings
 
 
 @dataclass(frozen=True)
@@ -42,10 +47,14 @@ class _Arguments(TrainSettings):
     """Make them on a Ray cluster."""
 
     @property
-    def settings(self) -> TrainSettings:
-        """The settings alone."""
+    def runs(self) -> list[TrainSettings]:
+        """The settings alone, with each seed; a folder that is given holds a subfolder for each of several."""
+        if len(set(self.seeds)) < max(1, len(self.seeds)):
+            raise SettingsError(f"seed={' '.join(map(str, self.seeds))} names none, or one twice")
         values = {field.name: getattr(self, field.name) for field in fields(TrainSettings)}
-        return TrainSettings(**{**values, "seed": self.seeds[0]})
+        if self.folder is None or len(self.seeds) == 1:
+            return [TrainSettings(**{**values, "seed": seed}) for seed in self.seeds]
+        return [TrainSettings(**{**values, "seed": k, "folder": self.folder / f"seed-{k}"}) for k in self.seeds]
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -62,14 +71,55 @@ def main(arguments: Sequence[str]) -> None:
     )
     given = replace(given, reward_weights={**default.reward_weights, **given.reward_weights})
     require("training", "torch", "stable_baselines3")
-    from posse_training.train.seeds import train_seeds, with_seeds
-
     try:
-        paths = list(train_seeds(with_seeds(given.settings, given.seeds), given.ray))
+        paths = train_all(given.runs, given.ray)
     except KeyboardInterrupt:
         print("\nto resume: run the same command again", file=sys.stderr)
         raise
     print("\n".join(map(str, paths)) if len(given.seeds) > 1 else _what_next(paths[0]))
+
+
+def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
+    """Train every run, or resume it where its folder holds it; return the best policies' files.
+
+    On a Ray cluster each run is one task, which writes to its run folder on a file system that all nodes share: a run
+    whose worker died is resumed from its checkpoint by another one.
+
+    Raises:
+        RunFolderError: A folder holds a run with other settings.
+        ClusterError: There is no such cluster, or a node does not share the file system.
+        Exception: As :func:`posse_training.train.train.train`; on a cluster when all runs have ended.
+    """
+    from posse_training.train.train import check_before, train  # torch
+
+    for settings in runs:
+        check_before(settings)
+        check_held(settings.run_folder / SETTINGS, settings.to_dict(), FREE)
+    if ray is False:
+        return [train(settings) for settings in runs]
+    with connected(ray, log=True):
+        results = dict(on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs]))
+    paths = [results[k] for k in range(len(runs))]
+    for path in paths:
+        if isinstance(path, Exception):
+            raise path
+    return paths
+
+
+def train_on_worker(settings: TrainSettings, where: Path) -> Path:
+    """Train on a worker as in the folder ``where``, on one thread; return the best policy's file.
+
+    Raises:
+        ClusterError: The node has no such folder.
+    """
+    from posse_training.train.train import train  # torch
+
+    if not where.is_dir():
+        raise ClusterError(f"node {platform.node()} has no folder {where}: train on a file system that all nodes share")
+    with contextlib.chdir(where):
+        console = Console(width=100)
+        console.print(f"seed {settings.seed}: {settings.run_folder}", markup=False)
+        return train(settings, console=console, num_threads=1)
 
 
 def _what_next(path: Path) -> str:

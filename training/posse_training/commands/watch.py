@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -15,8 +15,6 @@ from posse_training.options import Shown
 
 if TYPE_CHECKING:
     from posse import Scenario
-    from posse.rendering.canvas import Window
-    from posse.rendering.renderer import Renderer
     from posse_baselines import Policy
 
 _PAGE: Final = Path("runs/watch/replay.html")
@@ -72,18 +70,9 @@ def main(arguments: Sequence[str]) -> None:
     if which.out is not None:
         from posse_training.film import film
 
-        print(
-            film(
-                [(p.name, p) for p in policies],
-                scenario,
-                path=which.out,
-                start=0.0 if which.start is None else which.start,
-                seconds=scenario.duration if which.seconds is None else which.seconds,
-                speed=1.5 if which.speed is None else which.speed,
-                size=which.size,
-                **world,
-            )
-        )
+        asked = {"start": which.start, "seconds": which.seconds, "speed": which.speed, "size": which.size}
+        how: Any = {"seconds": scenario.duration} | {name: value for name, value in asked.items() if value is not None}
+        print(film([(p.name, p) for p in policies], scenario, path=which.out, **how, **world))
     elif which.page:
         from posse_training.replay import record, write_replay
 
@@ -115,7 +104,7 @@ def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int],
             team = Team(policies[shown], scenario, world=world, **worlds)
             renderer.title = f"{team.policy.name}, world {world}"
             renderer.draw(team.batch)
-            while not (team.over or _is_left(renderer, window, keys)):
+            while not (team.over or renderer.closed or window.pressed & keys.keys()):  # type: ignore[redundant-expr]
                 team.step()
                 window.paused |= team.over  # the last moment stays until a key is pressed
                 renderer.draw(team.batch, colours=team.colours)
@@ -128,8 +117,3 @@ def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int],
                 world += 1
     finally:
         renderer.close()
-
-
-def _is_left(renderer: Renderer, window: Window, keys: Mapping[str, str]) -> bool:
-    """Whether the user has closed the window, or pressed one of some keys."""
-    return renderer.closed or bool(window.pressed & keys.keys())

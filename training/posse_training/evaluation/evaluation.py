@@ -159,7 +159,7 @@ def gathered_results(
     What is finished is kept until the context ends without an exception; see
     :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
     """
-    with gathered([one.job for one in evaluations], ray, lambda shard: done()) as found:
+    with gathered([one.job for one in evaluations], ray, done) as found:
         both = zip(evaluations, found, strict=True)
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
 

@@ -7,9 +7,8 @@ new one replaces the last one atomically, so that a whole one exists whenever th
 from __future__ import annotations
 
 import csv
-import functools
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -19,18 +18,15 @@ import numpy.typing as npt
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from posse_baselines.files import write_atomically
+from posse_baselines.files import replacing, write_atomically
 from posse_training.errors import CheckpointError
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import Point
 
-Arrays = Mapping[str, npt.NDArray[Any]]
 State = dict[str, Any]
 """Nested dictionaries of tensors and plain values."""
 
 CHECKPOINT: Final = "checkpoint.pt"
-POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "contact_free")
-"""Of the curve: agent steps, s, mean safe score and its 95 % interval, mean score, share of episodes."""
 _REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -45,13 +41,12 @@ class Progress:
     curve: list[Point] = field(default_factory=list)
 
 
-def as_csv(curve: Iterable[Point]) -> bytes:
-    """Return a curve as the contents of ``curve.csv``."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, POINT)
-    writer.writeheader()
-    writer.writerows(curve)
-    return text.getvalue().encode()
+def write_curve(path: Path, curve: Sequence[Point]) -> None:
+    """Write a learning curve of one point or more."""
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, curve[0])
+        writer.writeheader()
+        writer.writerows(curve)
 
 
 def write_checkpoint(folder: Path, state: State) -> None:
@@ -95,7 +90,7 @@ def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics
     state = read_checkpoint(folder)
     try:
         model.policy.load_state_dict(state["model"]["parts"]["policy"])
-        statistics.restore(arrays_of(state["statistics"]))
+        statistics.restore(state["statistics"])
     except (KeyError, RuntimeError, TypeError, ValueError) as error:
         raise CheckpointError(
             f"the networks in {folder} do not fit this run: {error!s:.300}. Train with its hidden, "
@@ -107,7 +102,7 @@ def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics
             spread.fill_(log_deviation)
 
 
-def tensors_of(arrays: Arrays) -> dict[str, torch.Tensor]:
+def tensors_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, torch.Tensor]:
     """Return copies of arrays as tensors."""
     return {name: torch.from_numpy(np.array(array, order="C")) for name, array in arrays.items()}
 
@@ -132,11 +127,11 @@ def restore_random_state(state: State) -> None:
 
 def model_state(model: BaseAlgorithm) -> State:
     """Return all that resuming needs: networks and their states, optimisers, counters, replay."""
-    names, tensors = model._get_torch_save_params()
     arrays = {"obs": np.asarray(model._last_obs), "starts": np.asarray(model._last_episode_starts)}
+    _, tensors = model._get_torch_save_params()
     state: State = {
-        "parts": {name: _find(model, name).state_dict() for name in names},
-        "tensors": {name: _find(model, name).detach() for name in tensors},
+        "parts": model.get_parameters(),
+        "tensors": {name: getattr(model, name).detach() for name in tensors},
         "num_timesteps": model.num_timesteps,
         "n_updates": model._n_updates,
         "action_space": model.action_space.np_random.bit_generator.state,
@@ -151,11 +146,9 @@ def model_state(model: BaseAlgorithm) -> State:
 
 def restore_model(model: BaseAlgorithm, state: State) -> None:
     """Set a model of the same settings to the state of :func:`model_state`."""
-    names, tensors = model._get_torch_save_params()
-    for name in names:
-        _find(model, name).load_state_dict(state["parts"][name])
-    for name in tensors:
-        _find(model, name).data.copy_(state["tensors"][name])
+    model.set_parameters(state["parts"])
+    for name, tensor in state["tensors"].items():
+        getattr(model, name).data.copy_(tensor)
     model.num_timesteps = state["num_timesteps"]
     model._n_updates = state["n_updates"]
     model.action_space.np_random.bit_generator.state = state["action_space"]
@@ -166,8 +159,3 @@ def restore_model(model: BaseAlgorithm, state: State) -> None:
         buffer.pos, buffer.full = state["replay"]["position"], state["replay"]["full"]
         for name, part in arrays_of(state["replay"]["parts"]).items():
             getattr(buffer, name)[: buffer.size()] = part
-
-
-def _find(model: BaseAlgorithm, name: str) -> Any:
-    """Return the part of a model with a dotted name like ``"policy.optimizer"``."""
-    return functools.reduce(getattr, name.split("."), model)

@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import time
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -24,14 +24,15 @@ class Display:
         console: Where to show it.
 
     Attributes:
+        bar: To be entered while the run goes on.
         beside: Safe score of ``settings.beside`` on the same worlds, if known.
     """
 
     def __init__(self, settings: TrainSettings, console: Console) -> None:
         self.beside: float | None = None
         self._settings = settings
-        self._started, self._from_steps, self._steps = time.monotonic(), 0, 0
-        self._bar = Progress(
+        self._started, self._from_steps = time.monotonic(), 0
+        self.bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps{task.fields[state]}"),
@@ -40,35 +41,23 @@ class Display:
             transient=True,
             disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task(escape(settings.name), total=settings.steps, state="")
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        self._task = self.bar.add_task(escape(settings.name), total=settings.steps, state="")
 
     def note(self, text: str) -> None:
         """Print what the run is doing."""
-        self._bar.console.print(text, markup=False, soft_wrap=True)
-
-    def copied(self, done: int, rounds: int, error: float) -> None:
-        """Print how many rounds of imitation are done, and the mean squared error of the last."""
-        self.note(f"copying {self._settings.imitate}: {done} of {rounds} rounds, squared error {error:.4f}")
+        self.bar.console.print(text, markup=False, soft_wrap=True)
 
     def begin(self, steps: int, total: int) -> None:
         """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
         if total != self._settings.steps:
             self.note(f"rollouts are completed: {total:,} steps in all")
-        self._started, self._from_steps, self._steps = time.monotonic(), steps, steps
-        self._bar.reset(self._task, total=total, completed=steps)
+        self._started, self._from_steps = time.monotonic(), steps
+        self.bar.reset(self._task, total=total, completed=steps)
 
     def progress(self, steps: int, training_score: float | None) -> None:
         """Show the steps made, and the mean score of the latest training episodes."""
-        self._steps = steps
         score = "" if training_score is None else f", training score {training_score:.3f}"
-        self._bar.update(self._task, completed=steps, state=score)
+        self.bar.update(self._task, completed=steps, state=score)
 
     def evaluated(self, point: Point) -> None:
         """Print results on the validation worlds, after as many steps as they say."""
@@ -79,7 +68,7 @@ class Display:
         )
         if self.beside is not None:
             line += f", {self._settings.beside} {self.beside:.3f}"
-        made = self._steps - self._from_steps
+        made = point["steps"] - self._from_steps
         rate = f", {made / (time.monotonic() - self._started):,.0f} steps/s" if made else ""
         self.note(line + rate)
 

@@ -70,9 +70,9 @@ def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, floa
         "steps": steps,
         "commit": commit(),
         "curve": curve,
-        "validation_safe_score": curve[-1]["safe_score"] if curve else None,
-        "validation_score": curve[-1]["score"] if curve else None,
-        "validation_contact_free": curve[-1]["contact_free"] if curve else None,
+        **{
+            f"validation_{name}": curve[-1][name] if curve else None for name in ("safe_score", "score", "contact_free")
+        },
         "software": {
             "python": platform.python_version(),
             "posse": posse.__version__,

@@ -19,11 +19,12 @@ from torch.nn.functional import mse_loss
 import posse
 from posse import Scenario
 from posse.numeric import FloatArray
-from posse_baselines.learned import Encoder, Encoding
+from posse_baselines.learned import Encoding
 from posse_baselines.policy import Policy, begin
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
+from posse_training.train.vec_env import SlotGroup
 from posse_training.train.world_state import StateWriter
 
 WORLDS: Final = 64
@@ -46,7 +47,7 @@ def imitate(
     encoding: Encoding,
     expert: Policy,
     statistics: RunningStatistics,
-    report: Callable[[int, int, float], object] = lambda done, rounds, error: None,
+    report: Callable[[str], object],
 ) -> None:
     """Make a PPO model's policy a copy of the expert.
 
@@ -56,70 +57,52 @@ def imitate(
         encoding: Which inputs the model reads from an observation.
         expert: The policy to copy.
         statistics: Input statistics; those of the first round are added.
-        report: Called after each round with its number, the number of rounds and the mean squared error.
+        report: Called after each round with a line that says how far it is, and the mean squared error.
     """
     policy: Any = model.policy
     generator = np.random.default_rng(settings.seed)
     optimiser = torch.optim.Adam(policy.parameters(), lr=_LEARNING_RATE)
+
+    def fit(predict: Callable[[torch.Tensor], torch.Tensor], inputs: torch.Tensor, targets: torch.Tensor) -> float:
+        """Pass over the rows in random order until there were enough gradients; return the last pass's mean error."""
+        rows = len(inputs)
+        for _ in range(-(-_GRADIENTS // -(-rows // _MINIBATCH))):
+            total = 0.0
+            for chosen in torch.split(torch.from_numpy(generator.permutation(rows)), _MINIBATCH):
+                error = mse_loss(predict(inputs[chosen]), targets[chosen])
+                optimiser.zero_grad()
+                error.backward()  # type: ignore[no-untyped-call]
+                torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
+                optimiser.step()
+                total += error.item() * len(chosen)
+        return total / rows
+
     worlds = max(1, WORLDS // len(settings.scenarios))
     first_world = FIRST_WORLD
-    total = settings.imitate_rounds
-    rounds: list[Rows] = []
-    for k in range(total):
+    rounds = settings.imitate_rounds
+    every: list[Rows] = []
+    for k in range(rounds):
         played: list[Rows] = []
         for scenario in settings.scenarios:
-            by_expert = generator.random(worlds) < 1.0 - k / max(1, total - 1)
+            by_expert = generator.random(worlds) < 1.0 - k / max(1, rounds - 1)
             played.append(_play_round(policy, settings, encoding, expert, scenario, by_expert, first_world))
             first_world += worlds
-        rounds += played
+        every += played
         if k == 0:
             for rows, *_ in played:
                 statistics.add(rows)
             statistics.apply(policy)
-        inputs, actions, _ = _together(rounds)
-        error = _fit(policy, optimiser, generator, inputs, actions, _mean_action)
-        report(k + 1, total, error)
+        inputs, actions, _ = _together(every)
+        error = fit(lambda x: policy.get_distribution(x).distribution.mean, inputs, actions)
+        report(f"copying {settings.imitate}: {k + 1} of {rounds} rounds, squared error {error:.4f}")
     inputs, _, returns = _together(played)
     known = ~returns.isnan()
     if known.any():
-        _fit(policy, optimiser, generator, inputs[known], returns[known], _value)
-
-
-def _mean_action(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
-    mean: torch.Tensor = policy.get_distribution(inputs).distribution.mean
-    return mean
-
-
-def _value(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
-    value: torch.Tensor = policy.predict_values(inputs).flatten()
-    return value
+        fit(lambda x: policy.predict_values(x).flatten(), inputs[known], returns[known])
 
 
 def _together(parts: list[Rows]) -> tuple[torch.Tensor, ...]:
     return tuple(torch.from_numpy(np.concatenate(column)) for column in zip(*parts, strict=True))
-
-
-def _fit(
-    policy: Any,
-    optimiser: torch.optim.Optimizer,
-    generator: np.random.Generator,
-    inputs: torch.Tensor,
-    targets: torch.Tensor,
-    predict: Callable[[Any, torch.Tensor], torch.Tensor],
-) -> float:
-    """Pass over the rows in random order until there were enough gradients; return the last pass's mean error."""
-    rows = len(inputs)
-    passes = -(-_GRADIENTS // -(-rows // _MINIBATCH))
-    for _ in range(passes):
-        total = 0.0
-        for chosen in torch.split(torch.from_numpy(generator.permutation(rows)), _MINIBATCH):
-            error = mse_loss(predict(policy, inputs[chosen]), targets[chosen])
-            optimiser.zero_grad()
-            error.backward()  # type: ignore[no-untyped-call]
-            torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
-            optimiser.step()
-            total += error.item() * len(chosen)
-    return total / rows
 
 
 def _play_round(
@@ -135,17 +118,13 @@ def _play_round(
     parts, worlds, trackers = 2 + settings.message_size, len(by_expert), scenario.num_trackers
     longest = max(settings.message_size, expert.message_size)
     batch = posse.Batch(scenario.replace(message_size=longest), worlds, seed=settings.seed, first_world=first_world)
-    encoder = Encoder(encoding, batch.layout)
     state = StateWriter(batch, settings.scenarios) if ALGORITHMS[settings.algorithm].reads_state else None
-    size = encoding.size + (state.size if state else 0)
+    slots = SlotGroup(batch, encoding, state)
     observations = batch.reset()
     memory = begin(expert, batch)
     inputs, chosen, rewards = [], [], []
     for _ in range(scenario.horizon):
-        x = np.empty((worlds * trackers, size), np.float32)
-        encoder.encode(observations, x)
-        if state:
-            state.write(x[:, encoding.size :])
+        x = slots.encode(observations)
         wanted, memory = expert.act(observations, memory)
         actions = wanted.copy()
         if not by_expert.all():
@@ -161,14 +140,8 @@ def _play_round(
         rewards.append(reward.reshape(-1))
         if (terminated | truncated).all():
             break
-    returns = _returns(rewards, settings.discount)
+    returns = np.array(rewards, np.float32)  # (steps, rows), discounted
+    for t in reversed(range(len(rewards) - 1)):
+        returns[t] += np.float32(settings.discount) * returns[t + 1]
     returns[max(0, int(len(inputs) - _SETTLED / max(1e-3, 1 - settings.discount))) :] = np.nan
     return np.concatenate(inputs[::_EVERY]), np.concatenate(chosen[::_EVERY]), returns[::_EVERY].reshape(-1)
-
-
-def _returns(rewards: list[FloatArray], discount: float) -> FloatArray:
-    """Return discounted returns (steps, rows) of rewards (rows,) by step."""
-    returns = np.array(rewards, np.float32)
-    for t in reversed(range(len(rewards) - 1)):
-        returns[t] += np.float32(discount) * returns[t + 1]
-    return returns

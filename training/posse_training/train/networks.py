@@ -68,20 +68,13 @@ class RunningStatistics(RunningMeanStd):
                 module.mean.copy_(mean)
                 module.scale.copy_(scale)
 
-    def save(self) -> dict[str, npt.NDArray[Any]]:
-        """Return the statistics as arrays by name."""
-        return {"count": np.array([self.count]), "mean": self.mean, "variance": self.var}
+    def save(self) -> dict[str, Any]:
+        """Return the statistics as tensors and plain values."""
+        return {"count": self.count, "mean": torch.from_numpy(self.mean), "variance": torch.from_numpy(self.var)}
 
-    def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
-        """Set the statistics to those of :meth:`save`.
-
-        Raises:
-            ValueError: They are of another size.
-        """
-        if saved["mean"].shape != self.mean.shape:
-            raise ValueError(f"the mean has the shape {saved['mean'].shape}, wanted {self.mean.shape}")
-        self.count = float(saved["count"][0])
-        self.mean, self.var = saved["mean"].copy(), saved["variance"].copy()
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Set the statistics to those of :meth:`save`."""
+        self.count, self.mean, self.var = saved["count"], saved["mean"].numpy(), saved["variance"].numpy()
 
 
 class Front(nn.Module):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NoReturn, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import tyro
 
@@ -20,7 +21,8 @@ from posse_training.files import read_json
 from posse_training.options import Changes, MaybeNames, Names, Pairs
 
 Point = dict[str, float]
-"""Results of an evaluation, by the columns of ``curve.csv``."""
+"""Of a learning curve, by the columns of ``curve.csv``: agent steps, s, mean safe score and its 95 % interval, mean
+score, share of episodes without contact."""
 
 SETTINGS: Final = "settings.json"
 BEST: Final = "best.safetensors"
@@ -156,21 +158,16 @@ class TrainSettings:
     """Weights & Biases project to log to; needs the package wandb."""
 
     def __post_init__(self) -> None:
-        _check_each(self)
-        _check_together(self)
+        check_settings(self)
+        for message in chain(_misfits(self), _conflicts(self)):
+            raise SettingsError(message)
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
         """Every scenario and team size to train on, and the drawn scenarios of families."""
-        return tuple(
-            one
-            for given in self.given
-            for one in (
-                [given.draw(k, self.seed) for k in range(self.family_scenarios)]
-                if isinstance(given, Family)
-                else [given]
-            )
-        )
+        drawn = range(self.family_scenarios)
+        parts = ([g.draw(k, self.seed) for k in drawn] if isinstance(g, Family) else [g] for g in self.given)
+        return tuple(chain(*parts))
 
     @property
     def given(self) -> tuple[Scenario | Family, ...]:
@@ -181,12 +178,9 @@ class TrainSettings:
         if self.reward_weights:
             weights = "target_reward_weights" if self.side == "target" else "reward_weights"
             overrides[weights] = self.reward_weights
-        found = []
-        for name in self.scenario.split(","):
-            for size in self.team_sizes or (None,):
-                team: dict[str, Any] = {} if size is None else {"num_trackers": size}
-                found.append(scenario_or_family(name.strip(), **overrides, **team))
-        return tuple(found)
+        sizes: list[dict[str, Any]] = [{"num_trackers": size} for size in self.team_sizes] or [{}]
+        names = self.scenario.split(",")
+        return tuple(scenario_or_family(name.strip(), **overrides, **size) for name in names for size in sizes)
 
     @property
     def opponents(self) -> dict[str, int]:
@@ -216,13 +210,11 @@ class TrainSettings:
         Raises:
             SettingsError: An unknown setting, or an invalid value.
         """
-        if not isinstance(values, Mapping):
-            raise SettingsError(f"settings must map names to values, got {values!r:.80}")
+        fitted = {**values}
         known = {f.name for f in dataclasses.fields(cls)}
-        for name in values:
+        for name in fitted:
             if name not in known:
                 raise SettingsError(f"unknown setting {name!r:.80}; settings are: {', '.join(sorted(known))}")
-        fitted = dict(values)
         for name in ("hidden", "team_sizes"):
             if isinstance(fitted.get(name), list):
                 fitted[name] = tuple(fitted[name])
@@ -231,75 +223,62 @@ class TrainSettings:
         return cls(**fitted)
 
 
-def _check_each(s: TrainSettings) -> None:
-    """Raise if a setting is out of its range."""
-    check_settings(s)
+def _misfits(s: TrainSettings) -> Iterator[str]:
+    """Yield what is wrong with a setting on its own, beyond what it declares."""
     for name in ("overrides", "reward_weights"):
-        if not isinstance(getattr(s, name), dict):
-            _fail(name, getattr(s, name), "it must map names to values")
+        if not isinstance(value := getattr(s, name), dict):
+            yield f"{name}={value!r:.80} is invalid: it must map names to values"
     for name in ("hidden", "team_sizes"):
         value = getattr(s, name)
         if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):
-            _fail(name, value, "it must be whole numbers of at least 1")
+            yield f"{name}={value!r:.80} is invalid: it must be whole numbers of at least 1"
 
 
-def _fail(name: str, value: Any, why: str) -> NoReturn:
-    raise SettingsError(f"{name}={value!r:.80} is invalid: {why}")
-
-
-def _check_together(s: TrainSettings) -> None:
-    """Raise if settings that are valid on their own exclude each other."""
+def _conflicts(s: TrainSettings) -> Iterator[str]:
+    """Yield why settings that are valid on their own exclude each other."""
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
-        raise SettingsError(
-            f"final_log_deviation={s.final_log_deviation} must not exceed "
-            f"log_deviation={s.log_deviation}, where it begins"
+        yield (
+            f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}, where it "
+            "begins"
         )
     if s.encoding == "belief" and s.advise is None:
-        raise SettingsError("encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned")
+        yield "encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned"
     if s.advise is not None and (s.imitate is not None or s.message_size):
-        raise SettingsError(
-            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
-            "its adviser, which sends the messages"
+        yield (
+            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as its adviser, which "
+            "sends the messages"
         )
     if s.safeguard and (s.advise is not None or s.imitate is not None):
-        raise SettingsError(
+        yield (
             "safeguard=True goes with neither advise, whose own safeguard follows the correction, nor imitate, whose "
             "actions are no wanted velocities: use --no-safeguard"
         )
     own, other = ("target", "team") if s.side == "target" else ("team", "target")
     if getattr(s, own) is not None:
-        raise SettingsError(
+        yield (
             f"{own}={getattr(s, own)!r:.80} is of the side that learns, side={s.side!r}: name what it plays against "
             f"by {other}, or change side"
         )
     if s.side == "target":
-        _check_target(s)
+        if s.team is None:
+            yield "side='target' needs the teams that chase it: set team, for example to ddcs-tuned"
+        for name, needed in _OF_A_TARGET.items():
+            if (value := getattr(s, name)) != needed:
+                yield (
+                    f"{name}={value!r} does not go with side='target', which needs {needed!r}: a target has no team, "
+                    "no slots and no messages"
+                )
     for name, instead in _ELSEWHERE.items():
         if name in s.overrides and (name != "num_trackers" or s.team_sizes):
-            raise SettingsError(f"overrides cannot set {name!r}: use {instead} instead")
+            yield f"overrides cannot set {name!r}: use {instead} instead"
     parts = s.scenarios
     if s.num_worlds < len(parts):
-        raise SettingsError(
-            f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and team sizes"
-        )
+        yield f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and team sizes"
     if len({p.sonar_beams for p in parts}) > 1:
-        raise SettingsError("scenarios that are trained on together need equal sonar_beams: set it in overrides")
+        yield "scenarios that are trained on together need equal sonar_beams: set it in overrides"
 
 
-def _check_target(s: TrainSettings) -> None:
-    """Raise if settings do not fit a target that learns."""
-    if s.team is None:
-        raise SettingsError("side='target' needs the teams that chase it: set team, for example to ddcs-tuned")
-    wanted = {"imitate": None, "advise": None, "message_size": 0, "encoding": "plain", "safeguard": False}
-    for name, needed in wanted.items():
-        value = getattr(s, name)
-        if value != needed:
-            raise SettingsError(
-                f"{name}={value!r} does not go with side='target', which needs {needed!r}: a "
-                "target has no team, no slots and no messages"
-            )
-
-
+_OF_A_TARGET = {"imitate": None, "advise": None, "message_size": 0, "encoding": "plain", "safeguard": False}
 _ELSEWHERE = {
     "name": "the setting scenario",
     "message_size": "the setting message_size",
@@ -308,11 +287,6 @@ _ELSEWHERE = {
     "target_motion": "the setting target",
     "num_trackers": "the setting team_sizes",
 }
-
-
-def best_policy(folder: Path) -> Path:
-    """Return the file of a finished run's best policy; of its last one if it never was evaluated."""
-    return folder / (BEST if (folder / BEST).is_file() else LAST)
 
 
 def read_settings(path: Path) -> TrainSettings:

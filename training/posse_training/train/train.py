@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +15,6 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
-from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, DivergedError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
@@ -26,10 +24,10 @@ from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
+from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import adviser_of, check_opponents, load_own, make_env
+from posse_training.train.worlds import adviser_of, load_own, make_env, pairings
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -61,7 +59,8 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
-        display = stack.enter_context(Display(settings, console or Console()))
+        display = Display(settings, console or Console())
+        stack.enter_context(display.bar)
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
@@ -80,19 +79,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         except ValueError as error:  # torch's distributions refuse numbers that are not finite
             run.check_finite(error)
             raise
-    return best_policy(folder)
-
-
-def resume(folder: Path, *, console: Console | None = None, steps: int | None = None) -> Path:
-    """Resume the training of a run folder; see :func:`train`.
-
-    Args:
-        folder: The run folder.
-        console: Where to show progress.
-        steps: Total steps to train for, instead of those that the run was started with.
-    """
-    settings = replace(read_settings(folder / SETTINGS), folder=folder)
-    return train(settings if steps is None else replace(settings, steps=steps), console=console)
+    return folder / BEST
 
 
 def steps_made(settings: TrainSettings, num_envs: int) -> int:
@@ -103,11 +90,11 @@ def steps_made(settings: TrainSettings, num_envs: int) -> int:
 
 def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
-    check_algorithm(settings)
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
+    check_algorithm(settings)
     adviser_of(settings)
-    check_opponents(settings)
+    pairings(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             load_own(settings, policy)
@@ -133,7 +120,6 @@ class Run(BaseCallback):
         warm = settings.imitate is not None or settings.advise is not None
         self.at = Progress(next_evaluation=0 if warm else settings.evaluate_every)
         self._started = time.monotonic()
-        self._saved_at: int | None = None  # steps at the last checkpoint
 
     def begin(self) -> None:
         """Take what the model begins with: input statistics, another run's networks, a copy of a policy."""
@@ -143,7 +129,7 @@ class Run(BaseCallback):
         else:
             checkpoint.start_from(Path(s.start), self.model, self.statistics, s.log_deviation)
         if s.imitate is not None:
-            imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.copied)
+            imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.note)
 
     def restore(self, state: State) -> None:
         """Go back to where a checkpoint was written.
@@ -153,10 +139,10 @@ class Run(BaseCallback):
         """
         try:
             self.env.restore(arrays_of(state["worlds"]))
-            self.statistics.restore(arrays_of(state["statistics"]))
+            self.statistics.restore(state["statistics"])
             checkpoint.restore_model(self.model, state["model"])
             checkpoint.restore_random_state(state["random"])
-            self.at, self._saved_at = Progress(**state["progress"]), self.model.num_timesteps
+            self.at = Progress(**state["progress"])
             self._started -= self.at.seconds
         except Exception as error:  # whatever a state of other settings raises
             raise CheckpointError(
@@ -195,9 +181,8 @@ class Run(BaseCallback):
         elif self.at.rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
         self.at.rollouts += 1
-        steps = self.settings.rollout if self.on_policy else 1
-        for name, total in self.env.take_terms().items():
-            self.logger.record_mean(f"reward/{name}", total / steps)
+        for name, mean in self.env.take_terms().items():
+            self.logger.record_mean(f"reward/{name}", mean)
 
     def finish(self) -> None:
         """Evaluate once more, and write the last policy and checkpoint."""
@@ -206,16 +191,19 @@ class Run(BaseCallback):
         self.check_finite()
         if not self.at.curve or self.at.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
-        self._write(LAST)
+        self._policy().save(self.folder / LAST)
         self._checkpoint()
 
     def _evaluate(self) -> None:
         """Evaluate on the validation worlds; keep the policy if it is the best so far."""
-        steps, seconds = self.model.num_timesteps, self._seconds
-        point = {"steps": float(steps), "seconds": seconds, **validate(self.settings, self._policy())}
+        steps = self.model.num_timesteps
+        point = {"steps": float(steps), "seconds": time.monotonic() - self._started}
+        point |= validate(self.settings, self._policy())
         best = max((earlier["safe_score"] for earlier in self.at.curve), default=-1.0)
         self.at.curve.append(point)
-        self._write(BEST if point["safe_score"] > best else None)
+        checkpoint.write_curve(self.folder / CURVE, self.at.curve)
+        if point["safe_score"] > best:
+            self._policy().save(self.folder / BEST)
         for name in ("safe_score", "score", "contact_free"):
             self.logger.record(f"validation/{name}", point[name])
         self.logger.dump(steps)  # now, so that they are logged at the step that they belong to
@@ -223,20 +211,13 @@ class Run(BaseCallback):
 
     def _checkpoint(self) -> None:
         state = {
-            "worlds": tensors_of(self.env.save()),
-            "statistics": tensors_of(self.statistics.save()),
+            "worlds": tensors_of(self.env.arrays()),
+            "statistics": self.statistics.save(),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
-            "progress": {**vars(self.at), "seconds": self._seconds},
+            "progress": {**vars(self.at), "seconds": time.monotonic() - self._started},
         }
         checkpoint.write_checkpoint(self.folder, state)
-        self._saved_at = self.model.num_timesteps
-
-    def _write(self, name: str | None) -> None:
-        """Write the curve, and the policy under a name if there is one."""
-        write_atomically(self.folder / CURVE, checkpoint.as_csv(self.at.curve))
-        if name is not None:
-            self._policy().save(self.folder / name)
 
     def _policy(self) -> Any:
         card = make_card(self.settings, steps=self.model.num_timesteps, curve=self.at.curve)
@@ -249,26 +230,16 @@ class Run(BaseCallback):
             self.logger.record("training/score", score)
         self.display.progress(self.model.num_timesteps, score)
 
-    @property
-    def _seconds(self) -> float:
-        return time.monotonic() - self._started
-
     def check_finite(self, cause: Exception | None = None) -> None:
         """Raise where the networks hold numbers that are not finite, before these are evaluated or saved.
 
         Raises:
-            DivergedError: The message says what is kept.
+            DivergedError: The message says what to do.
         """
         if all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
             return
-        kept = "nothing was saved before"
-        if self._saved_at is not None:
-            kept = f"the checkpoint at {self._saved_at:,} steps is kept"
-            if self.at.curve:
-                best = max(self.at.curve, key=lambda point: point["safe_score"])
-                kept += f", and {BEST} of {int(best['steps']):,} steps"
         raise DivergedError(
-            f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
-            f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
-            "train again in another --out"
+            f"the training diverged at {self.model.num_timesteps:,} steps: its networks give numbers that are not "
+            f"finite; the checkpoint and {BEST} of before are kept, if there are any. Lower --learning-rate, or "
+            "--log-deviation, and train again in another --out"
         ) from cause

@@ -9,12 +9,11 @@ import numpy as np
 
 from posse_baselines import PolicyError, Target
 from posse_training.evaluation.evaluation import evaluate
-from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import mean
 from posse_training.train.display import Display
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import TARGET, load_own, make_env, pairings
+from posse_training.train.worlds import load_own, make_env, pairings
 
 VALIDATION_SEED: Final = 0
 _WARM_WORLDS: Final = 32
@@ -52,37 +51,34 @@ def score_beside(settings: TrainSettings, display: Display) -> float | None:
 
 
 def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
-    """Return a policy's results on the validation worlds.
+    """Return the results of the learning side's policy on the validation worlds of every pairing.
 
     ``safe_score`` with its 95 % interval ``low``, ``high``; ``score``; and ``contact_free``, the
-    share of episodes.
+    share of episodes. For a target, both scores are what it denies the team: 1 less the team's score.
     """
-    results = play_all(settings, policy, VALIDATION_SEED, "validation")
-    safe = mean(np.concatenate([r["safe_score"] for r in results]))
+    played: dict[str, list[Any]] = {"safe_score": [], "score": [], "contact_free": []}
+    for pair in pairings(settings):
+        team: Any = policy
+        target: Any = pair.opponent
+        if settings.side == "target":
+            team, target = pair.opponent, policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
+        results = evaluate(
+            team,
+            pair.scenario,
+            settings.evaluate_worlds,
+            VALIDATION_SEED,
+            target=target,
+            split="validation",
+            progress=False,
+        )
+        denied = 1 - results["score"]
+        for name, parts in played.items():
+            parts.append(denied if settings.side == "target" and name != "contact_free" else results[name])
+    columns = {name: np.concatenate(parts) for name, parts in played.items()}
+    safe = mean(columns["safe_score"])
     return {
         "safe_score": float(safe.value),
         "low": float(safe.low),
         "high": float(safe.high),
-        **{name: float(np.mean(np.concatenate([r[name] for r in results]))) for name in ("score", "contact_free")},
+        **{name: float(np.mean(columns[name])) for name in ("score", "contact_free")},
     }
-
-
-def play_all(settings: TrainSettings, policy: Any, seed: int, split: str) -> list[Results]:
-    """Play the learning side's policy on worlds of every pairing.
-
-    For a target, ``score`` and ``safe_score`` are what it denies the team: 1 less the team's score.
-    """
-    found = []
-    for pair in pairings(settings):
-        team: Any = policy
-        target: Any = pair.opponent
-        if settings.side == TARGET:
-            team, target = pair.opponent, policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
-        played = evaluate(
-            team, pair.scenario, settings.evaluate_worlds, seed, target=target, split=split, progress=False
-        )
-        if settings.side == TARGET:
-            denied = {"score": 1 - played["score"], "safe_score": 1 - played["score"]}
-            played = replace(played, columns={**played.columns, **denied})
-        found.append(played)
-    return found

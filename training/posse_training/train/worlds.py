@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
 import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
@@ -15,8 +17,6 @@ from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import TeamVecEnv
 
-TARGET = "target"
-
 
 class Pairing(NamedTuple):
     """A scenario and an opponent."""
@@ -25,45 +25,39 @@ class Pairing(NamedTuple):
     """With the opponent's target, or messages."""
     opponent: Policy | Target | None
     """A team's policy where the target learns, else a target; ``None``: the scenario's own target."""
-    share: int = 1
+    inside: dict[str, Any]
+    """The argument of :func:`posse.batches` that puts the opponent into the worlds, if it is a policy."""
+    share: int
     """How many parts of the worlds it gets."""
-
-
-def check_opponents(settings: TrainSettings) -> None:
-    """Raise if an opponent is unknown, or its memory cannot be saved, as resuming requires.
-
-    Raises:
-        PolicyError: The message names it.
-    """
-    for pairing in pairings(settings):
-        moved = pairing.opponent
-        policy = moved.policy if isinstance(moved, Target) else moved
-        if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
-            raise PolicyError(
-                f"{getattr(moved, 'name', '')!r} cannot be trained against: it reads the state of the worlds, or its "
-                "memory cannot be saved (it has no method arrays)"
-            )
 
 
 def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
     """Return every scenario with every opponent.
 
     Raises:
-        PolicyError: An unknown opponent, or one that does not move the other side.
+        PolicyError: An unknown opponent, one that does not move the other side, or one whose memory cannot be saved,
+            as resuming requires.
     """
     found: list[Pairing] = []
     for scenario in settings.given:
         if not settings.opponents:
-            found.append(Pairing(scenario, None))
+            found.append(Pairing(scenario, None, {}, 1))
         for name, share in settings.opponents.items():
-            if settings.side == TARGET:
-                policy = load(name)
+            opponent: Any
+            policy: Any
+            if settings.side == "target":
+                opponent = policy = load(name)
                 size = max(scenario.message_size, policy.message_size)
-                faced = scenario.replace(target_motion="agent", message_size=size)
-                found.append(Pairing(faced, policy, share))
+                faced, argument = scenario.replace(target_motion="agent", message_size=size), "team_policy"
             else:
-                target = load_target(name)
-                found.append(Pairing(target.fit(scenario), target, share))
+                opponent = load_target(name)
+                faced, policy, argument = opponent.fit(scenario), opponent.policy, "target_policy"
+            if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
+                raise PolicyError(
+                    f"{name!r} cannot be trained against: it reads the state of the worlds, or its memory cannot be "
+                    "saved (it has no method arrays)"
+                )
+            found.append(Pairing(faced, opponent, {} if policy is None else {argument: policy}, share))
     return tuple(found)
 
 
@@ -75,7 +69,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
     """
     batches = _make_batches(settings, num_threads)
     layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
-    if settings.side == TARGET:  # it hears no messages
+    if settings.side == "target":  # it hears no messages
         layout = ObservationLayout(layout.scenario.replace(message_size=0))
     encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
     return TeamVecEnv(
@@ -101,23 +95,17 @@ def adviser_of(settings: TrainSettings) -> Policy | None:
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
     """Return batches of worlds, divided among the pairings by their shares."""
     pairs = pairings(settings)
-    ends = [0]
-    for pair in pairs:
-        ends.append(ends[-1] + pair.share)
-    edges = [settings.num_worlds * end // ends[-1] for end in ends]
+    ends = np.cumsum([0, *(pair.share for pair in pairs)])
+    edges = (settings.num_worlds * ends // ends[-1]).tolist()
     if any(first == last for first, last in pairwise(edges)):
         raise SettingsError(
             f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
         )
     batches: list[posse.Batch] = []
     for pair, (first, last) in zip(pairs, pairwise(edges), strict=True):
-        scenario, inside = pair.scenario, dict[str, Any]()
+        scenario = pair.scenario
         if settings.end_on_contact:
             scenario = scenario.replace(terminate_on_contact=True)
-        if settings.side == TARGET:
-            inside = {"team_policy": pair.opponent}
-        elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
-            inside = {"target_policy": pair.opponent.policy}
         batches += posse.batches(
             scenario,
             last - first,
@@ -126,7 +114,7 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
             first_world=first,
             autoreset="disabled",
             num_threads=num_threads,
-            **inside,
+            **pair.inside,
         )
     return batches
 
@@ -137,4 +125,4 @@ def load_own(settings: TrainSettings, name: str) -> Any:
     Raises:
         PolicyError: It is unknown.
     """
-    return load_target(name) if settings.side == TARGET else load(name)
+    return load_target(name) if settings.side == "target" else load(name)
