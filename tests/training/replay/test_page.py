@@ -102,8 +102,6 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
 def test_a_page_with_damaged_data_is_named(tmp_path: Path) -> None:
     path = write_replay(short("constant"), tmp_path / "a.html")
     whole = path.read_text()
-    for old, new in (('id="data">', 'id="data">=x='), ('"settings":{', '"setting":{')):
-        assert old in whole
-        path.write_text(whole.replace(old, new, 1))
-        with pytest.raises(SettingsError, match=r"cannot read a replay from .*a\.html"):
-            read_replay(path)
+    path.write_text(whole.replace('id="data">', 'id="data">=x=', 1))
+    with pytest.raises(SettingsError, match=r"cannot read a replay from .*a\.html"):
+        read_replay(path)
