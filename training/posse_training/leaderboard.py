@@ -24,7 +24,6 @@ from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code, ships_or_is_file
 from posse_training.errors import ResultFileError
 from posse_training.evaluation.evaluation import evaluate
-from posse_training.evaluation.results import Results
 from posse_training.files import check_new
 from posse_training.provenance import commit
 
@@ -93,18 +92,21 @@ def check_texts(**texts: str) -> None:
             raise ResultFileError(f"{name}={text!r:.80} must be at most 100 letters, digits and '._:+ -'")
 
 
-def standing_of(label: str, text: str, policy: Policy, results: Results) -> Standing:
-    """Return the row of an evaluation; ``text`` is what the policy was loaded from."""
-    safe, played = results.estimate("safe_score"), results.scenario
+def measure(
+    label: str, text: str, policy: Policy, scenario: str, worlds: int, seed: int, split: str = "test"
+) -> Standing:
+    """Play a policy and return its row; ``text`` is what it was loaded from."""
+    results = evaluate(policy, scenario, worlds, seed, split=split)
+    safe = results.estimate("safe_score")
     return Standing(
         label=label,
         policy=text,
         reads_state=bool(policy.reads_state),
-        scenario=played.name,
-        version=played.version,
-        split=results.split,
-        seed=results.seed,
-        worlds=results.episodes,
+        scenario=scenario,
+        version=results.scenario.version,
+        split=split,
+        seed=seed,
+        worlds=worlds,
         safe_score=round(safe.value, 6),
         low=round(safe.low, 6),
         high=round(safe.high, 6),
@@ -167,7 +169,7 @@ def submit(
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
     check_new(out)
-    claim = standing_of(label, text, loaded, evaluate(loaded, scenario, episodes, seed))
+    claim = measure(label, text, loaded, scenario, episodes, seed)
     out.mkdir(parents=True, exist_ok=True)
     if content is not None:
         write_atomically(out / text, content)
@@ -208,11 +210,8 @@ def verify(
     policy = load(text if ":" in text or text in policy_names() else str(folder / text))
     drawn = secrets.randbelow(2**31) if seed is None else seed
 
-    def played(count: int, played_seed: int, split: str) -> Standing:
-        results = evaluate(policy, claim.scenario, count, played_seed, split=split)
-        return standing_of(claim.label, text, policy, results)
-
-    return Verdict(claim, played(claim.worlds, claim.seed, claim.split), played(episodes, drawn, "test"))
+    game = (claim.label, text, policy, claim.scenario)
+    return Verdict(claim, measure(*game, claim.worlds, claim.seed, claim.split), measure(*game, episodes, drawn))
 
 
 def submit_command(arguments: Sequence[str]) -> None:
