@@ -10,7 +10,7 @@ import math
 import platform
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -299,7 +299,7 @@ class _Run:
         played = self._play([values, {}], fresh, "validation", range(s.validation_worlds))
         for name, metrics in zip(("tuned", "untuned"), played, strict=True):
             others = {metric: float(metrics[metric].mean()) for metric in ("score", "contact_free")}
-            scores[name] = {"safe_score": mean(metrics["safe_score"]).to_dict(), **others}
+            scores[name] = {"safe_score": asdict(mean(metrics["safe_score"])), **others}
         (checked,) = self._play([values], 2, "validation", range(32))
         versions = {"cmaes": cmaes.__version__, "numpy": np.__version__, "posse": posse.__version__}
         return {

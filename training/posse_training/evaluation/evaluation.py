@@ -177,23 +177,13 @@ def _play_on_worker(
     split: str,
     time_limit: float | None,
     shard: range,
+    is_apart: bool = False,
 ) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
-    if isinstance(policy, str) and is_code(policy) and time_limit is not None:
-        found: Arrays = apart(time_limit, _play_here, policy, target, scenario, seed, split, time_limit, shard)
+    if time_limit is not None and isinstance(policy, str) and is_code(policy) and not is_apart:
+        given = (policy, target, scenario, seed, split, time_limit, shard, True)
+        found: Arrays = apart(time_limit, _play_on_worker, *given)
         return found
-    return _play_here(policy, target, scenario, seed, split, time_limit, shard)
-
-
-def _play_here(
-    policy: str | Policy,
-    target: Target | None,
-    scenario: Scenario | Family,
-    seed: int,
-    split: str,
-    time_limit: float | None,
-    shard: range,
-) -> Arrays:
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy
         advance = limited(no_report, time_limit)
