@@ -274,7 +274,7 @@ class Comparison:
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
             write_replay(join(replays), self.folder / name)
-        except (PlayError, SettingsError, TimeLimitError) as error:
+        except (PolicyError, PlayError, SettingsError, TimeLimitError) as error:
             return "", f"no replay: {error}"
         return name, ""
 

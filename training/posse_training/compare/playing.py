@@ -15,7 +15,7 @@ from typing import Any
 from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError
 from posse_training.compare.contenders import Contender, Plays, check_code
-from posse_training.errors import PlayError, TimeLimitError, describe
+from posse_training.errors import PlayError, TimeLimitError
 from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
@@ -105,7 +105,7 @@ def replay(contender: Contender, member: int, scenario: Scenario, world: int, ga
     """Play one world again with one of a contender's policies and record it, without observations.
 
     Raises:
-        PlayError: The policy failed.
+        PolicyError, PlayError: The policy failed.
         TimeLimitError: It exceeded the limit.
     """
     policy = contender.policies[member]
@@ -120,8 +120,6 @@ def _evaluate(policy: str | Policy, scenario: Scenario | Family, episodes: int, 
 
 
 def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:
-    try:
+    with played_errors():
         played: dict[str, Any] = {"target": game.target, "seed": game.seed, "split": game.split}
         return record([(label, policy)], scenario, world=world, observations=False, **played)
-    except Exception as error:
-        raise PlayError(describe(error)) from None
