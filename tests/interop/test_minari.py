@@ -53,8 +53,7 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
 
 
-def test_more_episodes_than_fit_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse_training.datasets.AT_ONCE", 2)
+def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
     data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
     assert [episode.id for episode in data] == list(range(5))
 

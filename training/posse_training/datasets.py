@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["load_dataset", "record_dataset"]
 
-AT_ONCE: Final = 20
-"""Episodes in memory at a time: some 20 MB for five trackers."""
 _RECORD: Final = ("observations", "actions", "rewards", "terms", "score", "terminated", "truncated")
 Metadata = dict[str, Any]
 
@@ -62,7 +60,7 @@ def record_dataset(
         name: Name of the data set; default: the policies', joined by ``-and-``.
         seed: Seed of the worlds.
         split: Split of the worlds.
-        progress: Called with the number of episodes that have been written since the last call.
+        progress: Called after each episode with 1, the number of episodes that were written.
         overrides: Settings of the scenario.
 
     Raises:
@@ -113,12 +111,11 @@ def record_dataset(
         (data := Path(partial, "new", "data")).mkdir(parents=True)
         storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
         storage.update_metadata(described)
-        for first in range(0, episodes, AT_ONCE):
-            worlds = range(first, min(first + AT_ONCE, episodes))
-            part = [_episode(players[world % len(players)], settings, world, seed, split) for world in worlds]
-            storage.update_episodes([buffer for buffer, _ in part])
-            storage.update_episode_metadata([metadata for _, metadata in part], worlds)
-            progress(len(worlds))
+        for world in range(episodes):
+            buffer, metadata = _episode(players[world % len(players)], settings, world, seed, split)
+            storage.update_episodes([buffer])
+            storage.update_episode_metadata([metadata], [world])
+            progress(1)
         (folder / called).parent.mkdir(parents=True, exist_ok=True)
         data.parent.rename(folder / called)
     return load_dataset(folder, called)
