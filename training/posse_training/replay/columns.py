@@ -45,7 +45,7 @@ _ACTION: Final = 0.004
 _SCORE: Final = 0.0001
 _BELIEF: Final = 0.01
 _FIX: Final = 0.01  # m, of a measured position
-_OBSERVED: Final = {"sonar": 0.02, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
+_OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
 STATES: Final = (
     *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
     *("tracker_sees", "tracker_slot", "tracker_onsets"),
