@@ -236,8 +236,9 @@ class _Run:
         """Return the search as it is after all past generations: its state follows from them and the seed."""
         from cmaes import CMA
 
-        s, bounds = self.settings, np.tile([0.0, 1.0], (len(self.names), 1))
-        cma = CMA(mean=space.start, sigma=SIGMA, bounds=bounds, seed=s.seed, population_size=s.population)
+        s, start = self.settings, space.start
+        bounds = np.tile([0.0, 1.0], (len(start), 1))
+        cma = CMA(mean=start, sigma=SIGMA, bounds=bounds, seed=s.seed, population_size=s.population)
         for points, scores in self.told:
             for _ in points:
                 cma.ask()  # draws what was drawn then
