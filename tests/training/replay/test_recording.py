@@ -146,7 +146,6 @@ def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"policies": ["idle"] * 5}, "1 to 4 players, got 5"),
         ({"seconds": float("nan")}, "seconds=nan must be above 0"),
         ({"world": -1}, "first_world=-1 must be"),
         ({"target_motion": "agent"}, "the target of 'smart' is an agent"),

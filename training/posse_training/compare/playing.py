@@ -30,18 +30,13 @@ Key = tuple[str, str, int]
 
 @dataclass(frozen=True)
 class Game:
-    """The worlds of a comparison, and what is played there."""
+    """The worlds of a comparison, and what is played there, by the arguments of an evaluation."""
 
     seed: int
     split: str
     target: str | None
-    limit: float
-    """Time limit of a policy on one scenario, s."""
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Arguments of an evaluation."""
-        return {"target": self.target, "split": self.split, "time_limit": self.limit}
+    time_limit: float
+    """Of a policy on one scenario, s."""
 
 
 def play(
@@ -61,7 +56,7 @@ def play(
             raise played
         if played is None:
             given = (policy, scenario, episodes, game)
-            played = apart(game.limit, _evaluate, *given) if isinstance(policy, str) else _evaluate(*given)
+            played = apart(game.time_limit, _evaluate, *given) if isinstance(policy, str) else _evaluate(*given)
         results.append(played)
     return Plays(contender.label, tuple(results))
 
@@ -90,9 +85,9 @@ def played_on_ray(
             key = scenario.name, contender.label, k
             try:
                 if isinstance(policy, str):
-                    check_code(policy, game.limit)
+                    check_code(policy, game.time_limit)
                 with played_errors():
-                    ready[key] = prepare(policy, scenario, episodes, game.seed, **game.options)
+                    ready[key] = prepare(policy, scenario, episodes, **vars(game))
             except (PolicyError, PlayError, TimeLimitError) as error:
                 found[key] = error
     total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
@@ -110,16 +105,16 @@ def replay(contender: Contender, member: int, scenario: Scenario, world: int, ga
     """
     policy = contender.policies[member]
     given = (contender.label, policy, scenario, world, game)
-    found: Replay = apart(game.limit, _record, *given) if isinstance(policy, str) else _record(*given)
+    found: Replay = apart(game.time_limit, _record, *given) if isinstance(policy, str) else _record(*given)
     return found
 
 
 def _evaluate(policy: str | Policy, scenario: Scenario | Family, episodes: int, game: Game) -> Results:
     with played_errors():
-        return evaluate(policy, scenario, episodes, game.seed, progress=False, **game.options)
+        return evaluate(policy, scenario, episodes, progress=False, **vars(game))
 
 
 def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:
     with played_errors():
-        played: dict[str, Any] = {"target": game.target, "seed": game.seed, "split": game.split}
-        return record([(label, policy)], scenario, world=world, observations=False, **played)
+        where: dict[str, Any] = {"world": world, "target": game.target, "seed": game.seed, "split": game.split}
+        return record([(label, policy)], scenario, observations=False, **where)
