@@ -84,7 +84,7 @@ def record_dataset(
     settings = get_scenario(scenario, **overrides)
     name = name or "-and-".join(each.name for each in players)
     called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_.-]', '-', name)}-v0"
-    folder = Path(out)
+    folder = Path(out).resolve()  # Minari joins a relative one to itself
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
     about = {
@@ -131,7 +131,7 @@ def load_dataset(out: str | Path, name: str) -> MinariDataset:
     require("datasets", "minari", "h5py")
     from minari import MinariDataset
 
-    path = Path(out, name, "data")
+    path = Path(out, name, "data").resolve()
     if not path.is_dir():
         raise FileNotFoundError(f"{path} does not exist: there is no data set of this name")
     return MinariDataset(path)
