@@ -49,7 +49,7 @@ class PosseTaskClass(TaskClass):
 
     def max_steps(self, env: EnvBase) -> int:
         """Return the length of an episode."""
-        steps: int = _batch(env).scenario.horizon
+        steps: int = env.batch.scenario.horizon
         return steps
 
     def has_render(self, env: EnvBase) -> bool:
@@ -91,12 +91,6 @@ class PosseTaskClass(TaskClass):
     def env_name() -> str:
         """Return the name of the environment in task names, ``posse/smart``."""
         return "posse"
-
-
-def _batch(env: EnvBase) -> Any:
-    while not isinstance(env, PosseEnv):
-        env = env.base_env
-    return env.batch
 
 
 class PosseTask(Task):
