@@ -165,14 +165,13 @@ def submit(
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
-    content = Path(policy).read_bytes() if is_file else None
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
     check_new(out)
     claim = measure(label, text, loaded, scenario, episodes, seed)
     out.mkdir(parents=True, exist_ok=True)
-    if content is not None:
-        write_atomically(out / text, content)
+    if is_file:
+        write_atomically(out / text, Path(policy).read_bytes())
     write_atomically(out / CLAIM, standings_text([claim]).encode())
     return claim
 
