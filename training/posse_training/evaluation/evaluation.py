@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from rich.console import Console
@@ -173,12 +174,13 @@ def _play_on_worker(
     split: str,
     time_limit: float | None,
     shard: range,
+    *,
     is_apart: bool = False,
 ) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
     if time_limit is not None and isinstance(policy, str) and is_code(policy) and not is_apart:
-        given = (policy, target, scenario, seed, split, time_limit, shard, True)
-        found: Arrays = apart(time_limit, _play_on_worker, *given)
+        call = partial(_play_on_worker, is_apart=True)
+        found: Arrays = apart(time_limit, call, policy, target, scenario, seed, split, time_limit, shard)
         return found
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy
