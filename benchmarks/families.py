@@ -31,7 +31,7 @@ def main(policies: list[str]) -> None:
         both = [evaluate(policy, family, WORLDS, progress=False) for family in (inside, outside)]
         scores = [found.estimate("safe_score") for found in both]
         cells = [
-            f"{score.value:.3f} [{score.low:.3f}, {score.high:.3f}] | {(found.contacts > 0).mean():.1%}"
+            f"{score.value:.3f} [{score.low:.3f}, {score.high:.3f}] | {1 - found['contact_free'].mean():.1%}"
             for score, found in zip(scores, both, strict=True)
         ]
         names.append(both[0].policy)

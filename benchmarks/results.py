@@ -13,8 +13,7 @@ import tyro
 
 import posse
 from posse_baselines import load, policy_names
-from posse_training.evaluation.evaluation import evaluate
-from posse_training.leaderboard import SEED, WORLDS, read_standings, standing_of, standings_text
+from posse_training.leaderboard import SEED, WORLDS, measure, read_standings, standings_text
 
 TABLE: Final = Path(__file__).parent / "standings.csv"
 SCENARIOS: Final = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
@@ -56,7 +55,7 @@ def main() -> None:
                 continue
             policy = load(name)
             worlds = settings.planner_worlds if policy.reads_state else settings.worlds
-            row = standing_of(name, name, policy, evaluate(policy, scenario, worlds, SEED, progress=False))
+            row = measure(name, name, policy, scenario, worlds, SEED)
             rows[scenario, name] = row
             print(f"{scenario:12s} {name:30s} {row.safe_score:.3f} [{row.low:.3f}, {row.high:.3f}]", flush=True)
             ordered = sorted(rows.values(), key=lambda row: (SCENARIOS.index(row.scenario), row.label))

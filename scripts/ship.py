@@ -15,7 +15,7 @@ import dataclasses
 import shlex
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -114,7 +114,7 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "steps": policy.card.get("steps"),
             "commit": policy.card.get("commit"),
             "command": command_of(run),
-            **{name: mean(play[name]).to_dict() for name in _JUDGED},
+            **{name: asdict(mean(play[name])) for name in _JUDGED},
         }
         for run, policy, play in zip(trained, policies, plays, strict=True)
     ]
@@ -146,8 +146,8 @@ def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequ
             f"{settings.name!r} costs {team} {cost} more than {scripted!r}: at least {least:g} is wanted"
         )
     comparison = {"team": team, "split": "test", "seed": TARGET_SEED, "worlds": settings.worlds}
-    comparison |= {"scores": {name: found.estimate("score").to_dict() for name, found in played.items()}}
-    card = {**_card(settings.name, policy, trained[0]), "comparison": {**comparison, "cost": cost.to_dict()}}
+    comparison |= {"scores": {name: asdict(found.estimate("score")) for name, found in played.items()}}
+    card = {**_card(settings.name, policy, trained[0]), "comparison": {**comparison, "cost": asdict(cost)}}
     return policy.with_card({**card, "check": make_target_check(team, scenario, new)})
 
 

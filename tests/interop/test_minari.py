@@ -53,8 +53,7 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
 
 
-def test_more_episodes_than_fit_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse_training.datasets.AT_ONCE", 2)
+def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
     data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
     assert [episode.id for episode in data] == list(range(5))
 
@@ -93,8 +92,16 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
         record_dataset([], "constant", 1, out=tmp_path)
 
 
-def test_the_command_says_how_to_load(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    settings = ["record", "idle", "--scenario", "constant", "--episodes", "1"]
-    assert main([*settings, "--out", str(tmp_path)]) == 0
-    assert "minari.load_dataset('posse/constant/idle-v0')" in capsys.readouterr().out
-    assert isinstance(load_dataset(tmp_path, "posse/constant/idle-v0"), minari.MinariDataset)
+def test_the_command_says_how_to_load(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "idle", "--scenario", "constant", "--episodes", "1"]) == 0
+    told = capsys.readouterr().out
+    assert "MINARI_DATASETS_PATH=runs/datasets and minari.load_dataset('posse/constant/idle-v0')" in told
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "runs/datasets")
+    for found in (
+        minari.load_dataset("posse/constant/idle-v0"),
+        load_dataset("runs/datasets", "posse/constant/idle-v0"),
+    ):
+        assert found[0].observations.shape[0] == 601

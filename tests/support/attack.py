@@ -21,7 +21,7 @@ def _vector(name: str) -> VectorEnv[Any, Any, Any]:
 
 
 def _torchrl() -> Any:
-    from posse_training.torchrl.env import PosseEnv
+    from posse_training.torchrl import PosseEnv
 
     return PosseEnv("constant", 2, **SHORT)
 

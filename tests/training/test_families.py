@@ -63,9 +63,10 @@ def test_what_cannot_hold_is_refused(changes: dict[str, Any], message: str) -> N
         posse.family("smart", **changes)
 
 
-def test_results_do_not_depend_on_how_worlds_are_cut() -> None:
+def test_results_do_not_depend_on_how_worlds_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = evaluate("ddcs-distributed", OPEN, 25, 3, progress=False)
-    parts = evaluate("ddcs-distributed", OPEN, 25, 3, progress=False, worlds=7)
+    monkeypatch.setattr("posse_training.evaluation.evaluation.WORLDS", 7)
+    parts = evaluate("ddcs-distributed", OPEN, 25, 3, progress=False)
     for name, column in whole.columns.items():
         np.testing.assert_array_equal(column, parts[name], name)
     alone = evaluate("ddcs-distributed", OPEN.draw(1, 3, "test"), 20, 3, progress=False)

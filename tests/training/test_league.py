@@ -14,17 +14,7 @@ from tests.support.runs import HORIZON, killed_at, quiet
 from posse_baselines import PolicyError
 from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.league import (
-    FILE,
-    MATRIX,
-    SUMMARY,
-    LeagueSettings,
-    against,
-    draw_matrix,
-    play_league,
-    shares,
-    tables,
-)
+from posse_training.league import FILE, MATRIX, SUMMARY, LeagueSettings, draw_matrix, play_league, shares, tables
 from posse_training.train.train import Run
 
 
@@ -125,4 +115,3 @@ def test_what_is_impossible_is_refused_before_anything_is_made(
 def test_harder_opponents_get_more_of_the_worlds() -> None:
     assert shares({"easy": 0.0, "hard": 0.9, "middle": 0.3}) == {"easy": 1, "hard": 7, "middle": 3}
     assert shares({"a": 0.0, "b": 0.0}) == {"a": 1, "b": 1}
-    assert against({"a": 2, "b": 1}) == "a,a,b"

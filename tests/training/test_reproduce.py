@@ -29,17 +29,17 @@ def test_settling_time_of_a_known_approach() -> None:
     relative = np.stack([np.stack([gap, 0 * gap], -1), np.zeros((81, 2))], axis=1)
     still = np.full((81, 2), 0.5)
     expected = np.ceil(-np.log(0.1 + np.exp(-8.0)) * 10) / 10
-    assert settling_times(run_with(relative, still), 0.1)[0] == pytest.approx(expected)
+    assert settling_times(run_with(relative, still))[0] == pytest.approx(expected)
     # A speed that is still off later settles later, however well the places are held.
     fast = still.copy()
     fast[:50, 1] = 0.7
-    assert settling_times(run_with(relative, fast), 0.1)[0] == pytest.approx(5.0)
+    assert settling_times(run_with(relative, fast))[0] == pytest.approx(5.0)
 
 
 def test_a_team_that_still_moves_at_the_end_has_not_settled() -> None:
     relative = np.zeros((81, 1, 2))
     relative[:, 0, 0] = 0.05 * np.arange(81)
-    assert np.isnan(settling_times(run_with(relative, np.ones((81, 1))), 0.1)[0])
+    assert np.isnan(settling_times(run_with(relative, np.ones((81, 1))))[0])
 
 
 def test_starts_are_the_figures() -> None:

@@ -24,7 +24,7 @@ GROUPS: Final = {
     "Make a team and measure it": {
         "train": ("train a team", "commands.train"),
         "compare": ("score policies on the same worlds", "compare.compare"),
-        "replay": ("write a replay of teams as a web page", "replay.command"),
+        "replay": ("write a replay of teams as a web page", "commands.replay"),
     },
     "Go further": {
         "tune": ("tune the settings of a scripted team", "tune"),

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import re
 import tempfile
-import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -32,9 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["load_dataset", "record_dataset"]
 
-AT_ONCE: Final = 20
-"""Episodes in memory at a time: some 20 MB for five trackers."""
-_PATH: Final = "MINARI_DATASETS_PATH"
 _RECORD: Final = ("observations", "actions", "rewards", "terms", "score", "terminated", "truncated")
 Metadata = dict[str, Any]
 
@@ -66,7 +60,7 @@ def record_dataset(
         name: Name of the data set; default: the policies', joined by ``-and-``.
         seed: Seed of the worlds.
         split: Split of the worlds.
-        progress: Called with the number of episodes that have been written since the last call.
+        progress: Called after each episode with 1, the number of episodes that were written.
         overrides: Settings of the scenario.
 
     Raises:
@@ -77,6 +71,7 @@ def record_dataset(
     """
     require("datasets", "minari", "h5py")
     import minari
+    from minari.dataset.minari_storage import MinariStorage
 
     given = [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
     players = [load(each) if isinstance(each, str) else each for each in given]
@@ -89,7 +84,7 @@ def record_dataset(
     settings = get_scenario(scenario, **overrides)
     name = name or "-and-".join(each.name for each in players)
     called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_.-]', '-', name)}-v0"
-    folder = Path(out)
+    folder = Path(out).resolve()  # Minari joins a relative one to itself
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
     about = {
@@ -101,33 +96,28 @@ def record_dataset(
         "policies": [{"name": each.name, "card": getattr(each, "card", None)} for each in players],
     }
     env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
-    create = {
-        "env": env,
-        "data_format": "hdf5",
-        "author": "posse",
-        "requirements": [f"posse-rl=={posse.__version__}"],
-        "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
+    described = {
+        "dataset_id": called,
+        "author": {"posse"},
         "algorithm_name": name,
+        "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
         "code_permalink": f"posse {posse.__version__} {about['commit'] or ''}",
+        "requirements": [f"posse-rl=={posse.__version__}"],
+        "minari_version": minari.__version__,
+        "posse": json.dumps(about),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial, _datasets_in(Path(partial)):
-        storage: Any = None
-        for first in range(0, episodes, AT_ONCE):
-            worlds = range(first, min(first + AT_ONCE, episodes))
-            part = [_episode(players[world % len(players)], settings, world, seed, split) for world in worlds]
-            buffers, metadata = (list(each) for each in zip(*part, strict=True))
-            if storage is None:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # that an e-mail address is missing
-                    storage = minari.create_dataset_from_buffers(called, buffers, **create).storage
-                storage.update_metadata({"posse": json.dumps(about)})
-            else:
-                storage.update_episodes(buffers)
-            storage.update_episode_metadata(metadata, worlds)
-            progress(len(worlds))
+    with tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial:
+        (data := Path(partial, "new", "data")).mkdir(parents=True)
+        storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
+        storage.update_metadata(described)
+        for world in range(episodes):
+            buffer, metadata = _episode(players[world % len(players)], settings, world, seed, split)
+            storage.update_episodes([buffer])
+            storage.update_episode_metadata([metadata], [world])
+            progress(1)
         (folder / called).parent.mkdir(parents=True, exist_ok=True)
-        Path(partial, called).rename(folder / called)
+        data.parent.rename(folder / called)
     return load_dataset(folder, called)
 
 
@@ -139,10 +129,12 @@ def load_dataset(out: str | Path, name: str) -> MinariDataset:
         FileNotFoundError: There is none of this name.
     """
     require("datasets", "minari", "h5py")
-    import minari
+    from minari import MinariDataset
 
-    with _datasets_in(Path(out)):
-        return minari.load_dataset(name)
+    path = Path(out, name, "data").resolve()
+    if not path.is_dir():
+        raise FileNotFoundError(f"{path} does not exist: there is no data set of this name")
+    return MinariDataset(path)
 
 
 def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: str) -> tuple[EpisodeBuffer, Metadata]:
@@ -172,21 +164,6 @@ def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: s
 
 def _after_zero(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.concatenate([np.zeros_like(rows[:1]), rows])
-
-
-@contextlib.contextmanager
-def _datasets_in(folder: Path) -> Iterator[None]:
-    """Let Minari keep its data sets in a folder meanwhile."""
-    folder.mkdir(parents=True, exist_ok=True)
-    before = os.environ.get(_PATH)
-    os.environ[_PATH] = str(folder.resolve())
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_PATH]
-        else:
-            os.environ[_PATH] = before
 
 
 @dataclass(frozen=True)

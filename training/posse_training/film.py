@@ -25,7 +25,6 @@ from posse_training.errors import SettingsError, require
 from posse_training.replay.page import PLAYERS, TASK_COLOURS
 
 _LARGEST: Final = 4096  # px, of width and height
-_MOST_FRAMES: Final = 2 << 30  # bytes of a GIF's, which are all in memory at once
 _STRIP: Final = 100  # px, height of the curves of scores in a film of _NARROW px
 _NARROW: Final = 640  # px, of width: in a wider film text and curves grow
 _LARGER: Final = 1.4  # times the size of text in other frames: films are shown small
@@ -132,8 +131,6 @@ def film(
     if min(width, height) < LEAST_SIZE or max(width * len(policies), height) > _LARGEST:
         raise SettingsError(f"size={size!r} must be at least {LEAST_SIZE} px a panel, and at most {_LARGEST} in all")
     first, last = (round(time / settings.control_step) for time in (start, min(start + seconds, settings.duration)))
-    if write is _gif and width * len(policies) * height * (last - first) // every > _MOST_FRAMES:
-        raise SettingsError("this GIF is too large: make it shorter (--seconds) or smaller (--size), or write an .mp4")
 
     teams = [(label, Team(policy, settings, seed, world, split, target)) for label, policy in policies]
     drawn = _frames(teams, (width, height), first, max(last, first + 1), every, speed)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
 import secrets
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -23,8 +24,6 @@ from posse_baselines.files import write_atomically
 from posse_baselines.registry import FILES, is_code
 from posse_training.errors import ResultFileError
 from posse_training.evaluation.evaluation import evaluate
-from posse_training.evaluation.results import Results
-from posse_training.evaluation.statistics import mean
 from posse_training.files import check_new
 from posse_training.provenance import commit
 
@@ -38,6 +37,7 @@ TOLERANCE: Final = 0.002
 CLAIM: Final = "standing.csv"
 _TEXT: Final = re.compile(r"[A-Za-z0-9._:+ -]{0,100}")
 """What a text of a table may hold: it is shown on a page, and names a file beside the table."""
+_KINDS: Final[dict[Any, Callable[[str], Any]]] = {"str": str, "int": int, "float": float, "bool": json.loads}
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Standing:
     """What a policy scores on a scenario: mean safe score with its 95 % interval, score, share without contact.
 
     Raises:
-        ResultFileError: A number that no evaluation gives, or a text that a page could not show as it is.
+        ResultFileError: A text that a page could not show as it is.
     """
 
     label: str
@@ -64,20 +64,11 @@ class Standing:
     commit: str
 
     def __post_init__(self) -> None:
-        for name in ("label", "policy", "scenario", "split", "commit"):
-            check_text(name, getattr(self, name))
-        ordered = 0 <= self.low <= self.safe_score <= min(self.high, self.score) <= max(self.high, self.score) <= 1
-        if not (ordered and 0 <= self.contact_free <= 1 and min(self.version, self.worlds) >= 1 and self.seed >= 0):
-            raise ResultFileError(f"no evaluation gives these numbers: {self}")
+        check_texts(**{name: value for name, value in vars(self).items() if isinstance(value, str)})
 
-
-_KINDS: Final[dict[str, Callable[[str], Any]]] = {
-    "bool": lambda text: {"true": True, "false": False}[text],
-    "int": int,
-    "float": float,
-    "str": str,
-}
-_COLUMNS: Final = {field.name: _KINDS[str(field.type)] for field in fields(Standing)}
+    def __str__(self) -> str:
+        interval = f"{self.safe_score:.4f} [{self.low:.4f}, {self.high:.4f}]"
+        return f"{self.label} on {self.scenario}: safe score {interval}, {self.worlds:,} worlds, seed {self.seed}"
 
 
 @dataclass(frozen=True)
@@ -94,24 +85,28 @@ class Verdict:
         return abs(self.claim.safe_score - self.repeated.safe_score) <= TOLERANCE
 
 
-def check_text(name: str, value: str) -> None:
+def check_texts(**texts: str) -> None:
     """Raise a ``ResultFileError`` for a text that a table cannot hold."""
-    if not _TEXT.fullmatch(value):
-        raise ResultFileError(f"{name}={value!r:.80} must be at most 100 letters, digits and '._:+ -'")
+    for name, text in texts.items():
+        if not _TEXT.fullmatch(text):
+            raise ResultFileError(f"{name}={text!r:.80} must be at most 100 letters, digits and '._:+ -'")
 
 
-def standing_of(label: str, text: str, policy: Policy, results: Results) -> Standing:
-    """Return the row of an evaluation; ``text`` is what the policy was loaded from."""
-    safe, played = mean(results["safe_score"]), results.scenario
+def measure(
+    label: str, text: str, policy: Policy, scenario: str, worlds: int, seed: int, split: str = "test"
+) -> Standing:
+    """Play a policy and return its row; ``text`` is what it was loaded from."""
+    results = evaluate(policy, scenario, worlds, seed, split=split)
+    safe = results.estimate("safe_score")
     return Standing(
         label=label,
         policy=text,
         reads_state=bool(policy.reads_state),
-        scenario=played.name,
-        version=played.version,
-        split=results.split,
-        seed=results.seed,
-        worlds=results.episodes,
+        scenario=scenario,
+        version=results.scenario.version,
+        split=split,
+        seed=seed,
+        worlds=worlds,
         safe_score=round(safe.value, 6),
         low=round(safe.low, 6),
         high=round(safe.high, 6),
@@ -122,10 +117,11 @@ def standing_of(label: str, text: str, policy: Policy, results: Results) -> Stan
 
 
 def standings_text(rows: Iterable[Standing]) -> str:
-    """Return a table as CSV."""
-    writer = csv.DictWriter(out := io.StringIO(), _COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({**asdict(row), "reads_state": str(row.reads_state).lower()} for row in rows)
+    """Return a table as CSV, with numbers as JSON has them."""
+    writer = csv.writer(out := io.StringIO(), lineterminator="\n")
+    writer.writerow(field.name for field in fields(Standing))
+    for row in rows:
+        writer.writerow(value if isinstance(value, str) else json.dumps(value) for value in vars(row).values())
     return out.getvalue()
 
 
@@ -137,8 +133,8 @@ def read_standings(path: str | Path) -> list[Standing]:
     """
     rows: list[Standing] = []
     try:
-        for row in csv.DictReader(Path(path).read_text(encoding="utf-8").splitlines(), strict=True):
-            values: dict[str, Any] = {name: kind(row[name]) for name, kind in _COLUMNS.items()}
+        for row in csv.DictReader(Path(path).read_text(encoding="utf-8").splitlines(), restval="", strict=True):
+            values = {field.name: _KINDS[field.type](row[field.name]) for field in fields(Standing)}
             rows.append(Standing(**values))
     except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
         raise ResultFileError(f"{path}, line {len(rows) + 2}: {error}") from error
@@ -169,16 +165,13 @@ def submit(
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
-    content = Path(policy).read_bytes() if is_file else None
     label = name or (loaded.name if is_file else policy)
-    check_text("name", label)
-    check_text("policy", text)
+    check_texts(name=label, policy=text)
     check_new(out)
-    results = evaluate(loaded, scenario, episodes, seed)
-    claim = standing_of(label, text, loaded, results)
+    claim = measure(label, text, loaded, scenario, episodes, seed)
     out.mkdir(parents=True, exist_ok=True)
-    if content is not None:
-        write_atomically(out / text, content)
+    if is_file:
+        write_atomically(out / text, Path(policy).read_bytes())
     write_atomically(out / CLAIM, standings_text([claim]).encode())
     return claim
 
@@ -203,8 +196,7 @@ def verify(
     Raises:
         ResultFileError: An invalid claim, code without ``run_code``, or another version of the scenario.
     """
-    path = folder / CLAIM
-    rows = read_standings(path)
+    rows = read_standings(path := folder / CLAIM)
     if len(rows) != 1:
         raise ResultFileError(f"{path} must have one row, it has {len(rows)}")
     claim, text = rows[0], rows[0].policy
@@ -217,29 +209,21 @@ def verify(
     policy = load(text if ":" in text or text in policy_names() else str(folder / text))
     drawn = secrets.randbelow(2**31) if seed is None else seed
 
-    def played(count: int, played_seed: int, split: str) -> Standing:
-        results = evaluate(policy, claim.scenario, count, played_seed, split=split)
-        return standing_of(claim.label, text, policy, results)
-
-    return Verdict(claim, played(claim.worlds, claim.seed, claim.split), played(episodes, drawn, "test"))
+    game = (claim.label, text, policy, claim.scenario)
+    return Verdict(claim, measure(*game, claim.worlds, claim.seed, claim.split), measure(*game, episodes, drawn))
 
 
 def submit_command(arguments: Sequence[str]) -> None:
     """``posse submit``: play, write and print the claim."""
-    print(_shown(tyro.cli(submit, prog="posse submit", args=arguments)))
+    print(tyro.cli(submit, prog="posse submit", args=arguments))
 
 
 def verify_command(arguments: Sequence[str]) -> int:
     """``posse verify``: play, print the verdict and the row for the leaderboard; 1 if the claim does not hold."""
     verdict = tyro.cli(verify, prog="posse verify", args=arguments)
     difference = verdict.claim.safe_score - verdict.repeated.safe_score
-    for name in ("claim", "repeated", "measured"):
-        print(f"{name}: {_shown(getattr(verdict, name))}")
+    for name, row in vars(verdict).items():
+        print(f"{name}: {row}")
     print(f"the claim {'holds' if verdict.holds else 'DOES NOT HOLD'} ({difference:+.4f}, allowed {TOLERANCE})")
     print("the measured row:", standings_text([verdict.measured]).splitlines()[1])
     return 0 if verdict.holds else 1
-
-
-def _shown(row: Standing) -> str:
-    interval = f"{row.safe_score:.4f} [{row.low:.4f}, {row.high:.4f}]"
-    return f"{row.label} on {row.scenario}: safe score {interval}, {row.worlds:,} worlds, seed {row.seed}"

@@ -90,15 +90,15 @@ class LeagueSettings:
     def __post_init__(self) -> None:
         check_settings(self)
         for name in ("teams", "targets"):
-            named = getattr(self, name)
-            if not named or any("," in each or not each for each in named):
-                raise SettingsError(f"{name}={named!r:.80} must name one or more, without commas")
-            if len({label_of(each) for each in named}) < len(named):
+            labels = [label_of(each) for each in getattr(self, name)]
+            if not labels or len(set(labels)) < len(labels):
                 raise SettingsError(
-                    f"{name}={named!r:.80} must have different names: rename the files, or leave one out"
+                    f"{name}={getattr(self, name)!r:.80} must be one or more, which must have different names: rename "
+                    "the files, or leave one out"
                 )
-        if "," in str(self.path):
-            raise SettingsError(f"the folder {str(self.path)!r:.80} must have no comma in its name")
+        for each in (*self.teams, *self.targets, str(self.path)):
+            if "," in each:
+                raise SettingsError(f"{each!r:.80} must be without commas, which stand between opponents: rename it")
 
     @property
     def path(self) -> Path:
@@ -128,10 +128,6 @@ class Member:
     def trained(self) -> bool:
         """Whether its training has ended, or it needed none."""
         return self.run is None or (self.run / LAST).is_file()
-
-
-Pair = tuple[Member, Member]
-"""A team and a target."""
 
 
 @dataclass(frozen=True)
@@ -170,10 +166,7 @@ class League:
     def __init__(self, settings: LeagueSettings, console: Console) -> None:
         self.settings, self.console = settings, console
         self.scenario = get_scenario(settings.scenario, **settings.overrides)
-        self.teams, self.targets = (
-            self._members(TEAM, settings.generations),
-            self._members(TARGET, settings.generations),
-        )
+        self.teams, self.targets = (self._members(side, settings.generations) for side in (TEAM, TARGET))
         self.cells: list[Cell] = []
         self.exploited: list[Exploited] = []
 
@@ -186,7 +179,7 @@ class League:
         for generation in range(1, self.settings.generations + 1):
             for side in (TARGET, TEAM):
                 self._generation(side, generation)
-        self.cells = [self._cell((team, target)) for team in self.teams for target in self.targets]
+        self.cells = [self._cell(team, target) for team in self.teams for target in self.targets]
         self._exploit(TARGET, self.teams, self.targets)
         self._exploit(TEAM, self.targets, self.teams)
 
@@ -197,12 +190,11 @@ class League:
         if trained.trained:
             return
         others = self._members(OTHER[side], generation - (side == TARGET))
-        if s.opponents == "fictitious" or len(others) == 1:
-            parts = dict.fromkeys((other.policy for other in others), 1)
-        else:
-            parts = shares(self._difficulties(side, own[-1], others))
-        steps = s.target_steps if side == TARGET else s.team_steps
-        self._train(side, trained, against(parts), steps, own)
+        hard = dict.fromkeys((other.policy for other in others), 0.0)
+        if s.opponents == "pfsp" and len(others) > 1:
+            hard = {other.policy: self._difficulty(side, own[-1], other) for other in others}
+        opponents = ",".join(name for name, part in shares(hard).items() for _ in range(part))
+        self._train(side, trained, opponents, s.target_steps if side == TARGET else s.team_steps, own)
 
     def _exploit(self, side: str, of: list[Member], others: list[Member]) -> None:
         """Train best responses of a side to the last member of the other one, or to all, and note what they gain."""
@@ -214,7 +206,7 @@ class League:
             best = Member(f"response to {to.label}", str(run / BEST), run)
             if not best.trained:
                 self._train(side, best, to.policy, s.response_steps, others)
-            after, *known = (self._cell((to, m) if side == TARGET else (m, to)) for m in (best, *others))
+            after, *known = (self._cell(*((to, m) if side == TARGET else (m, to))) for m in (best, *others))
             before = max(known, key=lambda cell: sign * cell.score.value)
             gain = sign * (after.score.value - before.score.value)
             self.exploited.append(Exploited(OTHER[side], to.label, gain, before, after))
@@ -255,33 +247,28 @@ class League:
         values |= {} if start is None else {"imitate": None}
         train(TrainSettings.from_dict({**values, **s.training}), console=self.console)
 
-    def _difficulties(self, side: str, own: Member, others: Sequence[Member]) -> dict[str, float]:
-        """Return how hard each opponent is for a member, in [0, 1], by what loads it.
+    def _difficulty(self, side: str, own: Member, other: Member) -> float:
+        """Return how hard an opponent is for a member, in [0, 1].
 
         For a team 1 less its safe score; for a target the team's score.
         """
         seed, worlds = CHOICE
-        found = {}
-        for other in others:
-            pair = (other, own) if side == TARGET else (own, other)
-            played = self._play(pair, worlds, seed, "validation")
-            found[other.policy] = played["score"].mean() if side == TARGET else 1 - played["safe_score"].mean()
-        return found
+        if side == TARGET:
+            return float(self._play(other, own, worlds, seed, "validation")["score"].mean())
+        return 1 - float(self._play(own, other, worlds, seed, "validation")["safe_score"].mean())
 
-    def _cell(self, pair: Pair) -> Cell:
+    def _cell(self, team: Member, target: Member) -> Cell:
         """Return what a team scores against a target; a pair that was played before is read."""
-        team, target = pair
         name = f"{team.label}-{target.label}".replace(" ", "-").replace("/", "-")
         path = self.settings.path / "cross-play" / f"{name}-{self.settings.episodes}.json"
         if not path.is_file():
-            results = self._play(pair, self.settings.episodes, TEST_SEED, "test")
+            results = self._play(team, target, self.settings.episodes, TEST_SEED, "test")
             scores = {name: asdict(results.estimate(name)) for name in ("score", "safe_score", "contact_free")}
             path.parent.mkdir(exist_ok=True)
             write_atomically(path, (json.dumps(scores, indent=2) + "\n").encode())
         return Cell(team.label, target.label, *(Estimate(**score) for score in read_json(path).values()))
 
-    def _play(self, pair: Pair, episodes: int, seed: int, split: str) -> Results:
-        team, target = pair
+    def _play(self, team: Member, target: Member, episodes: int, seed: int, split: str) -> Results:
         self.console.print(f"playing {team.label} against {target.label}", markup=False)
         return evaluate(team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False)
 
@@ -318,11 +305,6 @@ def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
     """
     total = sum(difficulties.values()) or 1.0
     return {name: 1 + round(_SHARES * d / total) for name, d in difficulties.items()}
-
-
-def against(parts: Mapping[str, int]) -> str:
-    """Return opponents and their shares as the setting of a training names them."""
-    return ",".join(name for name, part in parts.items() for _ in range(part))
 
 
 def write_results(found: League) -> None:

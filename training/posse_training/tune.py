@@ -9,11 +9,11 @@ import json
 import math
 import platform
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +44,8 @@ Point = npt.NDArray[np.float64]
 SETTINGS: Final = "settings.json"
 STATE: Final = "state.json"
 RESULT: Final = "tuned.json"
+_KEPT: Final = ("names", "told", "curve", "seconds")
+"""What the state holds of a run."""
 SIGMA: Final = 0.1
 """Initial standard deviation, as a share of each setting's range."""
 SCREENED_ON: Final = 8
@@ -104,45 +106,40 @@ class TuneSettings:
 
 @dataclass(frozen=True)
 class Space:
-    """Tunable settings as points of the unit cube.
+    """Settings that are searched, as points (n,) of the unit cube; the other tunable ones stay at their defaults.
 
     A range of positive numbers with a ratio of its ends of 10 or more is mapped by the logarithm.
     """
 
     tunables: tuple[Tunable, ...]
-    fixed: tuple[Tunable, ...] = ()
-    """Tunable settings that stay at their defaults; others may have to exceed them."""
+    names: Sequence[str]
+    """Of the settings that are searched."""
 
     @property
     def start(self) -> Point:
         """The defaults, (n,)."""
-        return np.array(
-            [
-                math.log(t.default / t.low) / math.log(t.high / t.low)
-                if _is_log(t)
-                else (t.default - t.low) / (t.high - t.low)
-                for t in self.tunables
-            ]
-        )
+        return np.array([_scaled(t, t.default) for t in self.tunables if t.name in self.names])
 
     def values(self, point: Point) -> dict[str, float]:
-        """Return the settings of a point (n,), those that must exceed another one made to."""
-        found: dict[str, float] = {}
-        for t, u in zip(self.tunables, np.clip(point, 0.0, 1.0).tolist(), strict=True):
+        """Return the settings of a point, and others that have to change to exceed them."""
+        values = {t.name: t.default for t in self.tunables}
+        searched = [t for t in self.tunables if t.name in self.names]
+        for t, u in zip(searched, np.clip(point, 0.0, 1.0).tolist(), strict=True):
             value = t.low * (t.high / t.low) ** u if _is_log(t) else t.low + u * (t.high - t.low)
             # Six digits, so that files stay readable; rounding must not leave the range.
-            found[t.name] = min(t.high, max(t.low, float(f"{value:.6g}")))
-        others = {t.name: t.default for t in self.fixed} | found
-        for t in (*self.tunables, *self.fixed):
-            if t.above and (t.name in found or t.above in found):
-                least = others[t.above] + _GAP * (t.high - t.low)
-                if others[t.name] < least:
-                    found[t.name] = min(t.high, least)
-        return found
+            values[t.name] = min(t.high, max(t.low, float(f"{value:.6g}")))
+        for t in self.tunables:
+            if t.above and not {t.name, t.above}.isdisjoint(self.names):
+                values[t.name] = max(values[t.name], min(t.high, values[t.above] + _GAP * (t.high - t.low)))
+        return {t.name: values[t.name] for t in self.tunables if t.name in self.names or values[t.name] != t.default}
 
 
 def _is_log(t: Tunable) -> bool:
     return t.low > 0.0 and t.high / t.low >= _LOG_FROM
+
+
+def _scaled(t: Tunable, value: float) -> float:
+    return math.log(value / t.low) / math.log(t.high / t.low) if _is_log(t) else (value - t.low) / (t.high - t.low)
 
 
 def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
@@ -162,30 +159,29 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     return folder / RESULT
 
 
-class _Worlds(NamedTuple):
-    seed: int
-    split: str
-    indices: range
-
-
 class _Run:
     """One run: what it plays, and its state."""
 
     def __init__(self, settings: TuneSettings, console: Console) -> None:
         check_settings(settings)
         self.settings, self.console = settings, console
-        self.policy, self.tunables = _tunable_policy(settings.policy)
-        found = scenario_or_family(settings.scenario)
-        self.scenario: Scenario | Family = found.replace(message_size=max(found.message_size, self.policy.message_size))
+        policy: Any = load(settings.policy)
+        is_tunable = hasattr(policy, "with_settings") and not getattr(policy, "trained_splits", ())
+        self.policy, self.tunables = policy, tunables(policy.settings) if is_tunable else ()
+        if not self.tunables:
+            raise PolicyError(
+                f"policy {settings.policy!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}"
+            )
         known = [t.name for t in self.tunables]
         for name in settings.only:
             if name not in known:
                 raise SettingsError(
                     f"only={name!r:.80} is not a tunable setting of {settings.policy!r}; these are: {', '.join(known)}"
                 )
-        fields = ("policy", "scenario", "seed", "population", "worlds", "validation_worlds", "every")
-        self.identity = {name: getattr(settings, name) for name in fields}
-        self.identity |= {"only": settings.only, "scenario_version": found.version}
+        found = scenario_or_family(settings.scenario)
+        self.scenario: Scenario | Family = found.replace(message_size=max(found.message_size, policy.message_size))
+        fields = ("policy", "scenario", "seed", "population", "worlds", "validation_worlds", "every", "only")
+        self.identity = {name: getattr(settings, name) for name in fields} | {"scenario_version": found.version}
         self.names: list[str] = []  # of the settings that are searched
         self.told: list[tuple[list[list[float]], list[float]]] = []  # points (P, n) and scores (P,) of each generation
         self.curve: list[dict[str, Any]] = []  # scores of the search's mean on validation worlds, the defaults' first
@@ -201,8 +197,7 @@ class _Run:
         self.console.print(f"searching {len(self.names)} settings: {', '.join(self.names)}", markup=False)
         if self.told:
             self.console.print(f"resuming after generation {len(self.told)}")
-        chosen = [t for t in self.tunables if t.name in self.names]
-        space = Space(tuple(chosen), tuple(t for t in self.tunables if t not in chosen))
+        space = Space(self.tunables, self.names)
         cma, since = self._cma(space), time.monotonic() - self.seconds
         if not self.curve:
             self.curve.append(self._validated({}))
@@ -211,13 +206,14 @@ class _Run:
             while not self._is_over():
                 self._generation(cma, space)
                 if len(self.told) % s.every == 0:
-                    self.curve.append(self._validated(space.values(_mean(cma))))
+                    self.curve.append(self._validated(space.values(cma.mean)))
                 self.seconds = time.monotonic() - since
-                self._keep()
+                state = {name: getattr(self, name) for name in _KEPT}
+                write_atomically(s.folder / STATE, json.dumps(state).encode())
                 bar.advance(task)
         # A point off the schedule counts only where the run ends: a run goes on as if uninterrupted.
         is_scored = self.curve[-1]["generation"] == len(self.told)
-        return self._card(self.curve if is_scored else [*self.curve, self._validated(space.values(_mean(cma)))])
+        return self._card(self.curve if is_scored else [*self.curve, self._validated(space.values(cma.mean))])
 
     def _resume(self) -> None:
         path = self.settings.folder / STATE
@@ -225,16 +221,12 @@ class _Run:
             return
         try:
             state = read_json(path)
-            for name in ("names", "told", "curve", "seconds"):
+            for name in _KEPT:
                 setattr(self, name, state[name])
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise CheckpointError(
                 f"{path} is damaged: {error}. The run cannot be resumed: remove {path.parent}, or choose another --out"
             ) from error
-
-    def _keep(self) -> None:
-        state = {"names": self.names, "told": self.told, "curve": self.curve, "seconds": self.seconds}
-        write_atomically(self.settings.folder / STATE, json.dumps(state).encode())
 
     def _is_over(self) -> bool:
         s, done = self.settings, len(self.told)
@@ -244,8 +236,9 @@ class _Run:
         """Return the search as it is after all past generations: its state follows from them and the seed."""
         from cmaes import CMA
 
-        s, bounds = self.settings, np.tile([0.0, 1.0], (len(space.tunables), 1))
-        cma = CMA(mean=space.start, sigma=SIGMA, bounds=bounds, seed=s.seed, population_size=s.population)
+        s, start = self.settings, space.start
+        bounds = np.tile([0.0, 1.0], (len(start), 1))
+        cma = CMA(mean=start, sigma=SIGMA, bounds=bounds, seed=s.seed, population_size=s.population)
         for points, scores in self.told:
             for _ in points:
                 cma.ask()  # draws what was drawn then
@@ -254,10 +247,9 @@ class _Run:
 
     def _generation(self, cma: CMA, space: Space) -> None:
         """Score a generation on worlds of its own, the same for all its candidates."""
-        s = self.settings
-        points, first = [cma.ask() for _ in range(s.population)], len(self.told) * s.worlds
-        worlds = _Worlds(s.seed, "train", range(first, first + s.worlds))
-        played = self._play([space.values(p) for p in points], worlds)
+        s, first = self.settings, len(self.told) * self.settings.worlds
+        points = [cma.ask() for _ in range(s.population)]
+        played = self._play(map(space.values, points), s.seed, "train", range(first, first + s.worlds))
         scores = [float(metrics["safe_score"].mean()) for metrics in played]
         cma.tell([(p, -v) for p, v in zip(points, scores, strict=True)])
         self.told.append((np.array(points).tolist(), scores))
@@ -265,24 +257,22 @@ class _Run:
     def _validated(self, values: dict[str, float]) -> dict[str, Any]:
         """Return a point of the curve: settings, and their score on the validation worlds."""
         s, generation = self.settings, len(self.told)
-        (metrics,) = self._play([values], _Worlds(s.seed, "validation", range(s.validation_worlds)))
+        (metrics,) = self._play([values], s.seed, "validation", range(s.validation_worlds))
         found = mean(metrics["safe_score"])
-        text = f"generation {generation:>4}  safe score {found}"
-        self.console.print(text, markup=False, highlight=False)
+        self.console.print(f"generation {generation:>4}  safe score {found}", markup=False, highlight=False)
         score = {"score": found.value, "low": found.low, "high": found.high}
         return {"generation": generation, **score, "settings": values}
 
-    def _play(self, candidates: Sequence[dict[str, float]], worlds: _Worlds) -> list[dict[str, Point]]:
+    def _play(
+        self, candidates: Iterable[dict[str, float]], seed: int, split: str, worlds: range
+    ) -> list[dict[str, Point]]:
         """Return the metrics of each candidate, (worlds,) each."""
         s = self.settings
-        threads = s.threads if s.ray is False else 1
-        seed, split, indices = worlds
         teams = [self.policy.with_settings(**values) for values in candidates]
-        calls = [(Match(team, None, self.scenario, seed, split), indices) for team in teams]
-        play = partial(play_shard, num_threads=threads)
+        calls = [(Match(team, None, self.scenario, seed, split), worlds) for team in teams]
         if s.ray is False:
-            return [play(*call) for call in calls]
-        found = dict(on_ray(play, calls))
+            return [play_shard(*call, num_threads=s.threads) for call in calls]
+        found = dict(on_ray(partial(play_shard, num_threads=1), calls))
         for result in found.values():
             if isinstance(result, Exception):
                 raise result
@@ -290,17 +280,12 @@ class _Run:
 
     def _effective(self) -> list[str]:
         """Return the settings whose ends of the range change any score in a few training worlds."""
-        worlds = _Worlds(self.settings.seed, "train", range(SCREENED_ON))
-        (usual,) = self._play([{}], worlds)
-        defaults = {t.name: t.default for t in self.tunables}
+        worlds = (self.settings.seed, "train", range(SCREENED_ON))
+        (usual,) = self._play([{}], *worlds)
         found: set[str] = set()
-        for ends in ({t.name: t.low for t in self.tunables}, {t.name: t.high for t in self.tunables}):
-            tried = []
-            for name in (name for name in ends if name not in found):
-                values = defaults | {name: ends[name]}
-                if all(values[o.name] > values[o.above] for o in self.tunables if o.above):
-                    tried.append(name)
-            played = self._play([{name: ends[name]} for name in tried], worlds)
+        for end in (0.0, 1.0):
+            tried = [t.name for t in self.tunables if t.name not in found]
+            played = self._play([Space(self.tunables, [name]).values(np.array([end])) for name in tried], *worlds)
             changed = [np.any(metrics["safe_score"] != usual["safe_score"]) for metrics in played]
             found |= {name for name, is_other in zip(tried, changed, strict=True) if is_other}
         return [t.name for t in self.tunables if t.name in found]
@@ -311,13 +296,13 @@ class _Run:
 
         s, best = self.settings, max(curve, key=lambda point: point["score"])
         values: dict[str, float] = best["settings"]
-        fresh = _Worlds(s.seed + FRESH_SEED, "validation", range(s.validation_worlds))
-        check = _Worlds(2, "validation", range(32))
-        scores: dict[str, Any] = {}
-        for name, metrics in zip(("tuned", "untuned"), self._play([values, {}], fresh), strict=True):
+        fresh, check = s.seed + FRESH_SEED, {"split": "validation", "seed": 2, "worlds": 32}
+        scores: dict[str, Any] = {"split": "validation", "seed": fresh}
+        played = self._play([values, {}], fresh, "validation", range(s.validation_worlds))
+        for name, metrics in zip(("tuned", "untuned"), played, strict=True):
             others = {metric: float(metrics[metric].mean()) for metric in ("score", "contact_free")}
-            scores[name] = {"safe_score": mean(metrics["safe_score"]).to_dict(), **others}
-        (checked,) = self._play([values], check)
+            scores[name] = {"safe_score": asdict(mean(metrics["safe_score"])), **others}
+        (checked,) = self._play([values], 2, "validation", range(32))
         versions = {"cmaes": cmaes.__version__, "numpy": np.__version__, "posse": posse.__version__}
         return {
             "format": FORMAT,
@@ -333,31 +318,10 @@ class _Run:
             "curve": [{k: v for k, v in point.items() if k != "settings"} for point in curve],
             "trained_splits": ["train"],
             "chosen_on": "validation",
-            "scores": {"split": fresh.split, "seed": fresh.seed, **scores},
-            "check": {
-                "split": check.split,
-                "seed": check.seed,
-                "worlds": len(check.indices),
-                "safe_score": float(checked["safe_score"].mean()),
-            },
+            "scores": scores,
+            "check": {**check, "safe_score": float(checked["safe_score"].mean())},
             "software": {**versions, "python": platform.python_version()},
         }
-
-
-def _mean(cma: CMA) -> Point:
-    """Return the mean of the search's distribution, (n,), within the cube."""
-    mean_of: Point = np.clip(cma.mean, 0.0, 1.0)
-    return mean_of
-
-
-def _tunable_policy(name: str) -> tuple[Any, tuple[Tunable, ...]]:
-    """Return a policy that has ``settings`` and ``with_settings``, and those of its settings that are tunable."""
-    policy: Any = load(name)
-    if hasattr(policy, "with_settings") and not getattr(policy, "trained_splits", ()):
-        found = tunables(policy.settings)
-        if found:
-            return policy, found
-    raise PolicyError(f"policy {name!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}")
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -80,7 +80,7 @@ class Settings:
     fix_trust: float = tuned(0.6, "", 0.05, 1.0)
     """Share of a new fix in the estimate of the position."""
     heading_trust: float = tuned(1.0, "", 0.02, 1.0)
-    """Share of a new measurement in the estimated heading of the slot frame. The target's heading has the same noise."""
+    """Share of a new measurement in the slot frame's estimated heading. The target's has the same noise."""
     frame_trust: float = tuned(0.5, "", 0.02, 1.0)
     """Where poses drift: share of a new measurement in the offset between a team-mate's frame and the own one."""
     least_patience: float = tuned(0.3, "s", 0.1, 3.0)

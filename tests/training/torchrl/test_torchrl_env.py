@@ -16,7 +16,7 @@ from posse.adapters.actions import MOTIONS
 from posse.signals.layout import StateLayout
 from posse_baselines import PolicyError
 from posse_baselines.safeguard import Guard
-from posse_training.torchrl.env import PosseEnv
+from posse_training.torchrl import PosseEnv
 
 WORLDS = 6
 SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}

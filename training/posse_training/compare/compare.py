@@ -7,7 +7,7 @@ import itertools
 import json
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -211,7 +211,7 @@ class Comparison:
             self._report()
         if "marl-eval" in s.export:
             write_marl_eval(self.plays, self.folder / "marl-eval.json")
-        rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in self.rows]
+        rows = [{k: asdict(v) if isinstance(v, Estimate) else v for k, v in row.items()} for row in self.rows]
         about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
         about["changed"] = s.overrides
         about |= {"comparison": rows, "left_out": self.left_out, "failed": self.failed}
@@ -274,7 +274,7 @@ class Comparison:
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
             write_replay(join(replays), self.folder / name)
-        except (PlayError, SettingsError, TimeLimitError) as error:
+        except (PolicyError, PlayError, SettingsError, TimeLimitError) as error:
             return "", f"no replay: {error}"
         return name, ""
 

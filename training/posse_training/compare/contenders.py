@@ -18,8 +18,6 @@ from posse_training.evaluation.evaluation import played_errors
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
 
-LONGEST_LABEL: Final = 100
-"""Characters of a label, at most."""
 LOADING: Final = 60.0
 """Time that code may take until it is a policy, s, at most."""
 
@@ -45,8 +43,8 @@ def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Conte
     own, for at most ``limit`` seconds or :data:`LOADING`; code that hangs there fails later, where it is to play.
 
     Raises:
-        PolicyError: No contender, a policy that cannot be loaded, a group without files, a label
-            that cannot be printed, or that two contenders share.
+        PolicyError: No contender, a policy that cannot be loaded, a group without files, or a label that two
+            contenders share.
     """
     if not texts:
         raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
@@ -64,7 +62,6 @@ def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Conte
         if not sign and not isinstance(policies[0], str) and is_file(text):
             name = policies[0].name
             label = name if name not in taken | stated else label
-        _check_label(label)
         found.append(Contender(label, policies))
     return tuple(found)
 
@@ -89,14 +86,6 @@ def _checked_code(name: str, limit: float) -> str:
     with contextlib.suppress(PlayError, TimeLimitError):
         check_code(name, limit)
     return name
-
-
-def _check_label(label: str) -> None:
-    if len(label) > LONGEST_LABEL or not label.isprintable():
-        raise PolicyError(
-            f"the label {label[:60]!r}... ({len(label):,} characters) must have at most "
-            f"{LONGEST_LABEL} printable characters: give it another one, LABEL=..."
-        )
 
 
 @dataclass(frozen=True)

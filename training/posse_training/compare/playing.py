@@ -15,7 +15,7 @@ from typing import Any
 from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError
 from posse_training.compare.contenders import Contender, Plays, check_code
-from posse_training.errors import PlayError, TimeLimitError, describe
+from posse_training.errors import PlayError, TimeLimitError
 from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
@@ -30,18 +30,13 @@ Key = tuple[str, str, int]
 
 @dataclass(frozen=True)
 class Game:
-    """The worlds of a comparison, and what is played there."""
+    """The worlds of a comparison, and what is played there, by the arguments of an evaluation."""
 
     seed: int
     split: str
     target: str | None
-    limit: float
-    """Time limit of a policy on one scenario, s."""
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Arguments of an evaluation."""
-        return {"target": self.target, "split": self.split, "time_limit": self.limit}
+    time_limit: float
+    """Of a policy on one scenario, s."""
 
 
 def play(
@@ -61,7 +56,7 @@ def play(
             raise played
         if played is None:
             given = (policy, scenario, episodes, game)
-            played = apart(game.limit, _evaluate, *given) if isinstance(policy, str) else _evaluate(*given)
+            played = apart(game.time_limit, _evaluate, *given) if isinstance(policy, str) else _evaluate(*given)
         results.append(played)
     return Plays(contender.label, tuple(results))
 
@@ -90,9 +85,9 @@ def played_on_ray(
             key = scenario.name, contender.label, k
             try:
                 if isinstance(policy, str):
-                    check_code(policy, game.limit)
+                    check_code(policy, game.time_limit)
                 with played_errors():
-                    ready[key] = prepare(policy, scenario, episodes, game.seed, **game.options)
+                    ready[key] = prepare(policy, scenario, episodes, **vars(game))
             except (PolicyError, PlayError, TimeLimitError) as error:
                 found[key] = error
     total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
@@ -105,23 +100,21 @@ def replay(contender: Contender, member: int, scenario: Scenario, world: int, ga
     """Play one world again with one of a contender's policies and record it, without observations.
 
     Raises:
-        PlayError: The policy failed.
+        PolicyError, PlayError: The policy failed.
         TimeLimitError: It exceeded the limit.
     """
     policy = contender.policies[member]
     given = (contender.label, policy, scenario, world, game)
-    found: Replay = apart(game.limit, _record, *given) if isinstance(policy, str) else _record(*given)
+    found: Replay = apart(game.time_limit, _record, *given) if isinstance(policy, str) else _record(*given)
     return found
 
 
 def _evaluate(policy: str | Policy, scenario: Scenario | Family, episodes: int, game: Game) -> Results:
     with played_errors():
-        return evaluate(policy, scenario, episodes, game.seed, progress=False, **game.options)
+        return evaluate(policy, scenario, episodes, progress=False, **vars(game))
 
 
 def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:
-    try:
-        played: dict[str, Any] = {"target": game.target, "seed": game.seed, "split": game.split}
-        return record([(label, policy)], scenario, world=world, observations=False, **played)
-    except Exception as error:
-        raise PlayError(describe(error)) from None
+    with played_errors():
+        where: dict[str, Any] = {"world": world, "target": game.target, "seed": game.seed, "split": game.split}
+        return record([(label, policy)], scenario, observations=False, **where)

@@ -47,12 +47,11 @@ def extremes(plays: Mapping[tuple[str, str], Plays], reference: str, count: int)
         base = plays.get((scenario, reference))
         if policy not in shown or base is None:
             continue
-        mine, theirs = found["safe_score"], base["safe_score"][0]
-        both = min(mine.shape[1], len(theirs))
-        gains = mine[:, :both] - theirs[:both]
+        mine, theirs = found.paired(base)
+        gains = mine - theirs[:1]
         for kept, place in ((wins, gains.argmax()), (losses, gains.argmin())):
-            seed, world = divmod(int(place), both)
-            kept.append(Extreme(scenario, policy, seed, world, float(mine[seed, world]), float(theirs[world])))
+            seed, world = divmod(int(place), gains.shape[1])
+            kept.append(Extreme(scenario, policy, seed, world, float(mine[seed, world]), float(theirs[0, world])))
     wins = sorted((one for one in wins if one.gain > 0), key=lambda one: -one.gain)
     losses = sorted((one for one in losses if one.gain < 0), key=lambda one: one.gain)
     return wins[:count] + losses[:count]

@@ -43,7 +43,6 @@ _SHORT: Final = {
 
 def row_of(plays: Plays, reference: Plays | None) -> Row:
     """Return the estimates of one policy on one scenario; differences are of the safe score, to the reference."""
-    contact_free, settled = plays["contact_free"] == 1, np.stack([result.settled for result in plays.results])
     gaps = None if reference is None else plays.paired(reference)
     return {
         "scenario": plays.scenario.name,
@@ -52,10 +51,10 @@ def row_of(plays: Plays, reference: Plays | None) -> Row:
         "safe_score": over_seeds(plays["safe_score"]),
         "of_planner": None,  # filled in once the planner has played
         "score": over_seeds(plays["score"]),
-        "contact_free": _share(contact_free),
+        "contact_free": _share(plays["contact_free"] == 1),
         "interquartile_mean": over_seeds(plays["safe_score"], middle_mean),
         "bound": over_seeds(plays["bound"]),
-        "settled": _share(settled),
+        "settled": _share(np.isfinite(plays["settling_time"])),
         "difference": None if gaps is None else difference(*gaps),
         "improvement": None if gaps is None else improvement(*gaps),
     }

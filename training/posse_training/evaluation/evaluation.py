@@ -25,7 +25,7 @@ from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
 WORLDS: Final = 500
-"""Worlds that are played at once."""
+"""Worlds that are played at once; on a cluster a shard. No policy that ships depends on it."""
 
 
 def evaluate(
@@ -40,7 +40,6 @@ def evaluate(
     num_threads: int | None = None,
     time_limit: float | None = None,
     ray: bool | str = False,
-    worlds: int = WORLDS,
     **overrides: Any,
 ) -> Results:
     """Play episodes of a scenario with a policy, here or on a Ray cluster, with the same result.
@@ -61,11 +60,10 @@ def evaluate(
             control step; default: none.
         ray: Play on a Ray cluster (extra ``cluster``): its address; ``True`` for the cluster of
             this machine, or else all its cores.
-        worlds: Worlds that are played at once; on a cluster a shard. No policy that ships depends on it.
         **overrides: Settings of the scenario.
 
     Raises:
-        SettingsError: ``episodes`` or ``worlds`` below 1.
+        SettingsError: ``episodes`` below 1.
         PolicyError: An unknown policy or target, or one that does not fit.
         TrainedSplitError: A split that the policy or the target was trained on.
         TimeLimitError: The time limit is exceeded.
@@ -75,7 +73,7 @@ def evaluate(
         PlayError: The policy failed on the cluster, or its workers died again and again.
     """
     given = scenario_or_family(scenario, **overrides)
-    one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit, worlds=worlds)
+    one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit)
     with progress_bar(disable=progress is not True) as bar:
         task = bar.add_task(escape(f"{one.policy.name} on {one.match.scenario.name}"), total=one.steps)
 
@@ -130,12 +128,10 @@ def prepare(
     target: str | Target | None = None,
     split: str = "test",
     time_limit: float | None = None,
-    worlds: int = WORLDS,
 ) -> Evaluation:
     """Return an evaluation whose arguments are those of :func:`evaluate`, and raise its errors."""
-    for name, value in (("episodes", episodes), ("worlds", worlds)):
-        if value < 1:
-            raise SettingsError(f"{name}={value} must be at least 1")
+    if episodes < 1:
+        raise SettingsError(f"episodes={episodes} must be at least 1")
     loaded = load(policy) if isinstance(policy, str) else policy
     opponent = None if target is None else load_target(target)
     for player in (loaded, opponent):
@@ -147,7 +143,7 @@ def prepare(
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
     match = Match(policy if is_name else loaded, opponent, scenario, seed, split)
-    return Evaluation(loaded, match, cut(episodes, worlds), time_limit)
+    return Evaluation(loaded, match, cut(episodes, WORLDS), time_limit)
 
 
 @contextmanager

@@ -50,19 +50,6 @@ class Results:
             raise KeyError(f"unknown metric {metric!r}; metrics are: {', '.join(self.columns)}")
         return self.columns[metric]
 
-    @property
-    def settled(self) -> npt.NDArray[np.bool_]:
-        """Whether the team settled, (episodes,)."""
-        settled: npt.NDArray[np.bool_] = np.isfinite(self.columns["settling_time"])
-        return settled
-
-    @property
-    def contacts(self) -> Column:
-        """Number of contacts of any kind, (episodes,)."""
-        kinds = ("tracker_contacts", "obstacle_contacts", "target_contacts")
-        total: Column = np.sum([self.columns[kind] for kind in kinds], axis=0)
-        return total
-
     def estimate(self, metric: str) -> Estimate:
         """Return the mean of a metric over the episodes that have it, with its 95 % interval."""
         return mean(self[metric])

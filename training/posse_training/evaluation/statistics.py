@@ -34,10 +34,6 @@ class Estimate:
             return "-"
         return f"{self.value:.3f} [{self.low:.3f}, {self.high:.3f}]"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the estimate as plain values."""
-        return {"value": self.value, "low": self.low, "high": self.high, "count": self.count}
-
 
 def _finite(values: npt.ArrayLike) -> Values:
     """Return the finite values; ``nan`` means "never happened"."""

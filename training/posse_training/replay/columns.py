@@ -7,7 +7,6 @@ tracker_x, tracker_y       (N,) m            position of each tracker
 tracker_heading            (N,) rad          its heading, without jumps of 2π
 tracker_sees               (N,)              1: its own sensor sees the target
 tracker_slot               (N,)              the slot that it occupies; -1: none
-tracker_onsets             (N,)              contacts that began in this step
 believed_x, _y, _heading   (N,) m, rad       the pose in which it believes to be. Omitted if poses do not drift
 tracker_broken             (N,)              1: it is broken
 tracker_sensor_dead        (N,)              1: its target sensor is in an outage
@@ -22,10 +21,9 @@ target_frame               () rad            heading of the slot frame, ψ
 target_dart                ()                1: a smart target darts
 score                      ()                score of the step
 action                     (rows, 2)         speed and turn rate, in [-1, 1]
-message                    (rows, m)         message of the policy
 reward/NAME                (rows,)           each term with a weight in the scenario, unweighted
 belief/NAME                (N, ...)          annotations by the policy
-observation/NAME           (rows, ...)       each field; only the sonar without ``observations``
+observation/NAME           (rows, ...)       each field; without ``observations`` the sonar alone
 ========================== ================= ======================================================
 
 Rows are the trackers, followed by the target if it is an agent.
@@ -33,7 +31,7 @@ Rows are the trackers, followed by the target if it is an agent.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -42,14 +40,12 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse_training.replay.episode import Column
 
-_FINE: Final = 0.001  # of lengths in m, angles in rad, ...
-_DRAWN: Final = 0.05  # of what is only drawn
-_ACTION: Final = 0.002
-_COARSE_ACTION: Final = 0.008
-_MESSAGE: Final = 1 / 512
+_FINE: Final = 0.001  # m, rad, ...
+_ACTION: Final = 0.004
 _SCORE: Final = 0.0001
 _BELIEF: Final = 0.01
 _FIX: Final = 0.01  # m, of a measured position
+_OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
 STATES: Final = (
     *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
     *("tracker_sees", "tracker_slot", "tracker_onsets"),
@@ -67,33 +63,21 @@ Arrays = Mapping[str, npt.NDArray[Any]]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
 
 
-def columns_of(arrays: Arrays, layout: ObservationLayout, terms: Sequence[str], whole: bool) -> dict[str, Column]:
-    """Return the columns of an episode.
-
-    Args:
-        arrays: The episode; annotations may be missing.
-        layout: Of the observations.
-        terms: Names of the reward terms to keep.
-        whole: Whether to keep all observations; else actions and beliefs are coarser.
-    """
-    actions = _last_kept(arrays["actions"])
+def columns_of(
+    arrays: Arrays, layout: ObservationLayout, terms: Iterable[str], fields: Iterable[str]
+) -> dict[str, Column]:
+    """Return the columns of an episode, whose annotations may be missing, with some reward terms and fields."""
     columns = _states(arrays, layout.scenario)
-    columns["action"] = Column(actions[..., :2], _ACTION if whole else _COARSE_ACTION)
-    if actions.shape[-1] > 2:
-        columns["message"] = Column(actions[..., 2:], _MESSAGE)
+    columns["action"] = Column(_last_kept(arrays["actions"])[..., :2], _ACTION)
     for name in terms:
         term = arrays[f"reward/{name}"]  # the first frame has no reward
         columns[f"reward/{name}"] = _number_column(np.concatenate([np.zeros_like(term[:1]), term]), _FINE)
     for name, values in arrays.items():
         if name.startswith("annotation/"):
-            belief = f"belief/{name.removeprefix('annotation/')}"
-            columns[belief] = _number_column(_last_kept(values), _BELIEF if whole else _DRAWN)
+            columns[f"belief/{name.removeprefix('annotation/')}"] = _number_column(_last_kept(values), _BELIEF)
     views = layout.views(arrays["observations"])
-    for field in layout.fields:
-        if whole or field.name == "sonar":
-            finest = (0.01 if field.unit == "s" else _FINE) if whole else _DRAWN
-            finest = _MESSAGE if field.name == "neighbour_message" else finest
-            columns[f"observation/{field.name}"] = _number_column(views[field.name], finest, field.unit)
+    for name in fields:
+        columns[f"observation/{name}"] = _number_column(views[name], _OBSERVED.get(name, _FINE))
     return columns
 
 
@@ -102,15 +86,14 @@ def _last_kept(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.concatenate([rows, rows[-1:]])
 
 
-def _number_column(values: npt.NDArray[Any], resolution: float, unit: str = "1") -> Column:
+def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
     """Return a column that is stored exactly if its values are whole numbers."""
-    finite = np.isfinite(values)
-    whole = np.array_equal(values[finite], np.rint(values[finite]))
-    return Column(values, 1.0 if whole else resolution, unit)
+    finite = values[np.isfinite(values)]
+    return Column(values, 1.0 if np.array_equal(finite, np.rint(finite)) else resolution)
 
 
 def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
-    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _FINE, "rad")
+    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _FINE)
 
 
 def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
@@ -120,33 +103,32 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
 
     def in_outage(name: str) -> Column:
         since = step.astype(np.int64) - states[name]
-        return Column(((since >= 0) & (since < outage)).astype(np.int8))
+        return Column((since >= 0) & (since < outage))
 
     columns = {
-        "tracker_x": Column(states["tracker_x"], _FINE, "m"),
-        "tracker_y": Column(states["tracker_y"], _FINE, "m"),
+        "tracker_x": Column(states["tracker_x"], _FINE),
+        "tracker_y": Column(states["tracker_y"], _FINE),
         "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
         "tracker_sees": Column(states["tracker_sees"]),
         "tracker_slot": Column(states["tracker_slot"]),
-        "tracker_onsets": Column(states["tracker_onsets"]),
-        "tracker_broken": Column((states["tracker_broken_at"] <= step).astype(np.int8)),
+        "tracker_broken": Column(states["tracker_broken_at"] <= step),
         "tracker_sensor_dead": in_outage("tracker_sensor_dead_from"),
         "tracker_radio_dead": in_outage("tracker_radio_dead_from"),
         "tracker_fix_step": Column(states["tracker_fix_step"]),
-        "tracker_fix_x": Column(states["tracker_fix_x"], _FIX, "m"),
-        "tracker_fix_y": Column(states["tracker_fix_y"], _FIX, "m"),
+        "tracker_fix_x": Column(states["tracker_fix_x"], _FIX),
+        "tracker_fix_y": Column(states["tracker_fix_y"], _FIX),
         "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
-        "target_x": Column(states["world_x"], _FINE, "m"),
-        "target_y": Column(states["world_y"], _FINE, "m"),
+        "target_x": Column(states["world_x"], _FINE),
+        "target_y": Column(states["world_y"], _FINE),
         "target_heading": _angle(states, "world_heading_cos", "world_heading_sin"),
         "target_frame": _angle(states, "world_frame_cos", "world_frame_sin"),
-        "target_dart": Column((states["world_pressed"] < 0).astype(np.int8)),
+        "target_dart": Column(states["world_pressed"] < 0),
         "score": Column(states["world_score"], _SCORE),
     }
     if states["odometry_x"].size:
-        for name, unit in (("x", "m"), ("y", "m"), ("heading", "rad")):
-            true = columns[f"tracker_{name}"].values
-            columns[f"believed_{name}"] = Column(true + states[f"odometry_{name}"], _FINE, unit)
+        for name in ("x", "y", "heading"):
+            believed = columns[f"tracker_{name}"].values + states[f"odometry_{name}"]
+            columns[f"believed_{name}"] = Column(believed, _FINE)
     if states["heard_step"].size:
         columns["heard_step"] = Column(states["heard_step"])
     return columns

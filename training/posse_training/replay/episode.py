@@ -16,7 +16,6 @@ import numpy.typing as npt
 from posse_training.errors import SettingsError
 
 MOST_PLAYERS: Final = 4
-EVENT_KINDS: Final = ("detection", "dart", "contact", "break", "leader", "settled")
 
 
 @dataclass(frozen=True)
@@ -26,12 +25,10 @@ class Column:
     Attributes:
         values: (T + 1, ...), one row per frame; nan: no value in this frame.
         resolution: A page stores the values to half of this. 1: they are whole numbers.
-        unit: Unit of the values.
     """
 
     values: npt.NDArray[Any]
     resolution: float = 1.0
-    unit: str = "1"
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ class Event:
 
     Attributes:
         step: The first frame after the event.
-        kind: One of :data:`EVENT_KINDS`.
+        kind: ``"detection"``, ``"dart"``, ``"contact"``, ``"break"``, ``"leader"`` or ``"settled"``.
         text: Description.
         robots: Numbers of the trackers involved.
     """

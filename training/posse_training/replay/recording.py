@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
@@ -16,7 +17,7 @@ from posse_training.errors import SettingsError
 from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
 from posse_training.replay.columns import STATES, columns_of
-from posse_training.replay.episode import MOST_PLAYERS, Player, Replay, join
+from posse_training.replay.episode import Player, Replay, join
 from posse_training.replay.events import find_events
 
 _PLACES: Final = ("world_seed", "world_index", "world_episode", "obstacle_x", "obstacle_y", "obstacle_radius")
@@ -57,37 +58,31 @@ def record(
         SettingsError: No policy, more than four, ``seconds`` not above 0.
         PolicyError, ScenarioError: An argument that is unknown, invalid, or does not fit the scenario.
     """
-    settings = own = get_scenario(scenario, **overrides)
+    settings = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)
-    if not 1 <= len(policies) <= MOST_PLAYERS:
-        raise SettingsError(f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies")
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
     steps = settings.horizon if seconds is None else max(1, round(seconds / settings.control_step))
-    options = _options(own, observations, target=target, world=world, seed=seed, split=split, seconds=seconds)
+    options = _options(settings, observations, target=target, world=world, seed=seed, split=split, seconds=seconds)
+    place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
     replays = []
     for given in policies:
-        label, policy = given if isinstance(given, tuple) else (None, given)
-        argument = policy if isinstance(policy, str) else ""
-        if isinstance(policy, str):
-            policy = load(policy)
-        place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
-        batch = batch_for(policy, settings, 1, opponent, **place, autoreset="disabled")
-        played = rollout(batch, policy, RECORD, steps=steps)
-        one = replay_of(played, label or policy.name, observations=observations, about=_about(policy))
-        players = tuple(replace(player, argument=argument) for player in one.players)
-        replays.append(Replay(one.world | {"options": options}, players))
+        label, policy = given if isinstance(given, tuple) else ("", given)
+        loaded = load(policy) if isinstance(policy, str) else policy
+        batch = batch_for(loaded, settings, 1, opponent, **place, autoreset="disabled")
+        played = rollout(batch, loaded, RECORD, steps=steps)
+        one = replay_of(played, label or loaded.name, observations=observations, about=_about(loaded))
+        player = replace(one.players[0], argument=policy if isinstance(policy, str) else "")
+        replays.append(Replay(one.world | {"options": options}, (player,)))
     return join(replays)
 
 
 def _options(scenario: Scenario, observations: bool, **played: object) -> list[str] | None:
     """Return the options with which ``posse replay`` plays this world; ``None``: it has none for some setting."""
-    if scenario.name not in scenario_names() or not isinstance(played["target"], str | None):
-        return None
-    named = get_scenario(scenario.name).to_dict()
-    changed = {name: value for name, value in scenario.to_dict().items() if named[name] != value}
+    changed = {name: here for name, (_, here) in _changed(scenario).items()}
     settings = words_of(changed)
-    if settings_of(settings) != changed:
+    nameable = scenario.name in scenario_names() and isinstance(played["target"], str | None)
+    if not nameable or settings_of(settings) != changed:
         return None
     words: list[str] = []
     for name, value in {"scenario": scenario.name, **played}.items():
@@ -97,29 +92,31 @@ def _options(scenario: Scenario, observations: bool, **played: object) -> list[s
     return [*words, "--set", *settings] if settings else words
 
 
+def _changed(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
+    """Return the settings that are not those of the scenario of this name, or else of ``constant``: old and new."""
+    named = get_scenario(scenario.name if scenario.name in scenario_names() else "constant").to_dict()
+    return {name: (named[name], value) for name, value in scenario.to_dict().items() if named[name] != value}
+
+
 def replay_of(
-    trajectory: Trajectory,
-    name: str,
-    *,
-    world: int = 0,
-    observations: bool = True,
-    about: Mapping[str, Any] | None = None,
+    trajectory: Trajectory, name: str, *, observations: bool = True, about: Mapping[str, Any] | None = None
 ) -> Replay:
-    """Return the first episode of a world as a replay with one player.
+    """Return the first episode of a trajectory's first world as a replay with one player.
 
     Args:
-        trajectory: Has the arrays that :data:`RECORD` names; annotations may be missing.
+        trajectory: Has the arrays that :data:`RECORD` names; annotations may be missing. Of another world:
+            :meth:`posse_baselines.Trajectory.episode`.
         name: Name of the player on the page.
-        world: Index in the trajectory.
         observations: Whether to keep all observations, which are most of a page's size.
         about: Description of the policy; plain JSON.
     """
-    one = trajectory.episode(world)
+    one = trajectory.episode(0)
     arrays = {key: array[:, 0] for key, array in one.arrays.items()}
-    described = _describe_world(arrays, one, observations)
+    fields = [field for field in one.layout.fields if observations or field.name == "sonar"]
+    world = _describe_world(arrays, one, fields)
     metrics = {key: float(values[0]) for key, values in one.metrics.items()}
-    columns = columns_of(arrays, one.layout, list(described["weights"]), observations)
-    return Replay(described, (Player(name, columns, find_events(arrays), metrics, dict(about or {})),))
+    columns = columns_of(arrays, one.layout, world["weights"], [field.name for field in fields])
+    return Replay(world, (Player(name, columns, find_events(arrays), metrics, dict(about or {})),))
 
 
 def _about(policy: Policy) -> dict[str, Any]:
@@ -129,52 +126,42 @@ def _about(policy: Policy) -> dict[str, Any]:
     for name, value in card.items() if isinstance(card, Mapping) else ():
         text = ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
         if not isinstance(value, Mapping) and len(text) <= _LONGEST_ENTRY:
-            about[str(name)] = value if isinstance(value, (int, float)) else text
+            about[name] = value if isinstance(value, (int, float)) else text
     return about
 
 
 def _describe_world(
-    arrays: Mapping[str, npt.NDArray[Any]], trajectory: Trajectory, observations: bool
+    arrays: Mapping[str, npt.NDArray[Any]], trajectory: Trajectory, fields: Sequence[Field]
 ) -> dict[str, Any]:
     """Return the common data of all players of a world, as plain JSON with infinite numbers."""
     scenario = trajectory.scenario
-    start = {name: arrays[name][0] for name in _PLACES}
+    start = {name: arrays[name][0].tolist() for name in _PLACES}
     weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
-    named = _settings(get_scenario(scenario.name if scenario.name in scenario_names() else "constant"))
-    settings = _settings(scenario)
-    return {
+    world = {
         "posse": posse.__version__,
         "commit": commit(),
         "scenario": scenario.name,
         "version": scenario.version,
-        "settings": settings,
+        "settings": scenario.to_dict(),
         # The size of a message is set by the policy.
         "changed": {
-            name: [named[name], value]
-            for name, value in settings.items()
-            if name not in ("name", "meaning", "message_size") and named[name] != value
+            name: both for name, both in _changed(scenario).items() if name not in ("name", "meaning", "message_size")
         },
-        "seed": int(start["world_seed"]),
+        "seed": start["world_seed"],
         "split": trajectory.split,
-        "world": int(start["world_index"]),
-        "episode": int(start["world_episode"]),
+        "world": start["world_index"],
+        "episode": start["world_episode"],
         "agents": scenario.num_agents,
-        "slots": [[float(x), float(y)] for x, y in scenario.slot_offsets],
-        "obstacles": [
-            [float(start[f"obstacle_{name}"][k]) for name in ("x", "y", "radius")]
-            for k in range(scenario.num_obstacles)
-        ],
-        "tasks": list(TASKS),
+        "slots": scenario.slot_offsets,
+        "obstacles": list(zip(*(start[f"obstacle_{name}"] for name in ("x", "y", "radius")), strict=True)),
+        "tasks": TASKS,
         "weights": weights,
         "terms": [_meaning(term) for term in REWARD_TERMS if term.name in weights],
-        "fields": [_field(field) for field in trajectory.layout.fields if observations or field.name == "sonar"],
+        "fields": [_field(field) for field in fields],
         "metrics": [_meaning(metric) for metric in posse.METRICS],
     }
-
-
-def _settings(scenario: Scenario) -> dict[str, Any]:
-    """Return every setting by name, with pairs as lists, as JSON has them."""
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in scenario.to_dict().items()}
+    plain: dict[str, Any] = json.loads(json.dumps(world))  # with lists for tuples, as it is read from a page
+    return plain
 
 
 def _meaning(declared: Any) -> dict[str, str]:
@@ -192,5 +179,4 @@ def _field(field: Field) -> dict[str, Any]:
     else:
         block = "own motion" if field.name in _OWN else "task"
     unknown = None if field.unknown is None else float(field.unknown)
-    numbers = {"size": field.size, "low": float(field.low), "high": float(field.high), "unknown": unknown}
-    return {**_meaning(field), **numbers, "block": block}
+    return {**_meaning(field), "size": field.size, "unknown": unknown, "block": block}

@@ -23,7 +23,16 @@ from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import write_atomically
 from posse_training.reproduce import runs
 from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
-from posse_training.reproduce.runs import SPLIT, Floats, draw_starts, median_world, settling_times, slot_error
+from posse_training.reproduce.runs import (
+    SPEED_TOLERANCE,
+    SPLIT,
+    TOLERANCE,
+    Floats,
+    draw_starts,
+    median_world,
+    settling_times,
+    slot_error,
+)
 from posse_training.style import RC, save
 
 HORIZON: Final = 250
@@ -60,8 +69,6 @@ class Settings:
     """Number of drawn starts; figures show the run with the median settling time."""
     seed: int = 7
     """Seed of the starts, in the test split."""
-    tolerance: float = 0.1
-    """Distance of a relative position from its last value at which it counts as settled, m."""
 
 
 def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
@@ -88,7 +95,7 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     rows, played = [], {}
     for policy in MEMBERS:
         run = runs.run_of(policy, scenario, settings.starts, settings.seed, starts)
-        played[policy] = run, settling_times(run, settings.tolerance)
+        played[policy] = run, settling_times(run)
         rows.append(summary(policy, played[policy][1], slot_error(run)[-1]))
     with mpl.rc_context(RC):
         for model in MODELS:
@@ -103,7 +110,7 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
         save(tracks(settings.seed), settings.out, "tracks")
         loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
         save(loss, settings.out, "leader-loss")
-    stated = {"seed": settings.seed, "split": SPLIT, "tolerance": settings.tolerance}
+    stated = {"seed": settings.seed, "split": SPLIT, "tolerance": TOLERANCE}
     text = json.dumps({**stated, "policies": rows}, indent=2)
     write_atomically(settings.out / "settling.json", f"{text}\n".encode())
     return rows
@@ -113,7 +120,7 @@ def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
     """Return the settling times with those of the paper."""
     shown = Table(
         *("policy", "model", "paper", "median\n\\[quartiles]", "settled", "in slots"),  # not markup
-        title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
+        title=f"settling time, s: finally within {TOLERANCE:g} m and {SPEED_TOLERANCE:g} m/s;\n"
         f"{settings.starts:,} starts of {runs.played(posse.get_scenario(PLAYED), settings.seed)}",
         box=box.HORIZONTALS,
         padding=0,

@@ -18,6 +18,8 @@ Floats = npt.NDArray[np.floating[Any]]
 SPLIT: Final = "test"
 TARGET_HEADING: Final = math.pi
 """In the paper's figure 7 the target is the leftmost robot: it heads towards -x."""
+TOLERANCE: Final = 0.1
+"""m; a position relative to the target within this of its last value has settled."""
 SPEED_TOLERANCE: Final = 0.1
 """m/s; a speed within this of its last value has settled."""
 _DRAWN_AT_ONCE: Final = 2000  # worlds, from which starts are selected
@@ -96,15 +98,14 @@ def told(run: Trajectory, name: str) -> npt.NDArray[np.integer[Any]]:
     return none if notes is None else np.concatenate([notes, notes[-1:]])
 
 
-def settling_times(run: Trajectory, tolerance: float) -> Floats:
+def settling_times(run: Trajectory) -> Floats:
     """Return the settling time of each world, (E,) s: the paper's "keep a certain value".
 
-    After it, every tracker's position relative to the target stays within ``tolerance`` of its
-    last value, and its speed within :data:`SPEED_TOLERANCE` of its last; ``nan`` if that holds
-    only for less than the last second.
+    After it, every tracker's position relative to the target stays within :data:`TOLERANCE` of its last value, and its
+    speed within :data:`SPEED_TOLERANCE` of its last; ``nan`` if that holds only for less than the last second.
     """
     place, speeds, time = relative(run), run["tracker_speed"].astype(np.float64), times(run)
-    moved = np.linalg.norm(place - place[-1], axis=-1) > tolerance
+    moved = np.linalg.norm(place - place[-1], axis=-1) > TOLERANCE
     changed = np.abs(speeds - speeds[-1]) > SPEED_TOLERANCE
     unsettled = (moved | changed).any(axis=-1)  # (T + 1, E)
     last = np.where(unsettled.any(axis=0), run.steps - unsettled[::-1].argmax(axis=0), -1)

@@ -1,23 +1,30 @@
-"""The task class that BenchMARL asks for: a batch of worlds with the state, either kind of action.
+"""With BenchMARL: scenarios as its tasks, a batch of worlds with the state, either kind of action.
 
-A configuration file in ``conf`` for each task names the scenario and its settings. Policies of
-BenchMARL learn from ``("agents", "observation")``, critics and mixers from ``"state"``.
+Policies of BenchMARL learn from ``("agents", "observation")``, critics and mixers from ``"state"``. BenchMARL wants a
+torchrl before 0.12.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from benchmarl.environments import Task, TaskClass, task_config_registry
+from posse_training.errors import MissingExtraError
+
+try:
+    from benchmarl.environments import Task, TaskClass, task_config_registry
+except ImportError as error:
+    raise MissingExtraError(
+        f"benchmarl cannot be imported ({error}). It wants a virtual environment of its own: "
+        "`make recipes`, from a clone, makes one"
+    ) from error
+
 from torchrl.data import Composite
 from torchrl.envs import EnvBase
 
-from posse_training.torchrl.env import PosseEnv
+from posse_training.torchrl import PosseEnv
 
-CONFIGURATIONS: Final = Path(__file__).parent / "conf"
-"""Folder of the tasks' configuration files, one for each scenario."""
+__all__ = ["PosseTask", "PosseTaskClass", "register"]
 
 
 class PosseTaskClass(TaskClass):
@@ -42,7 +49,7 @@ class PosseTaskClass(TaskClass):
 
     def max_steps(self, env: EnvBase) -> int:
         """Return the length of an episode."""
-        steps: int = _batch(env).scenario.horizon
+        steps: int = env.batch.scenario.horizon
         return steps
 
     def has_render(self, env: EnvBase) -> bool:
@@ -86,12 +93,6 @@ class PosseTaskClass(TaskClass):
         return "posse"
 
 
-def _batch(env: EnvBase) -> Any:
-    while not isinstance(env, PosseEnv):
-        env = env.base_env
-    return env.batch
-
-
 class PosseTask(Task):
     """A task for each scenario that all of BenchMARL's algorithms may learn."""
 
@@ -108,9 +109,9 @@ class PosseTask(Task):
         return PosseTaskClass
 
     def get_from_yaml(self, path: str | None = None) -> PosseTaskClass:
-        """Return the task of a configuration file, by default the one that comes with posse."""
-        own = CONFIGURATIONS / f"{self.name.lower()}.yaml"
-        task: PosseTaskClass = super().get_from_yaml(str(own) if path is None else path)
+        """Return the task of a configuration file; default: the scenario as it is, on the split ``"train"``."""
+        own = {"scenario": self.name.lower(), "split": "train"}
+        task: PosseTaskClass = self.get_task(own) if path is None else super().get_from_yaml(path)
         return task
 
 

@@ -9,9 +9,7 @@ from pathlib import Path
 import tyro
 
 from posse_training.options import Shown
-from posse_training.replay.episode import Replay, join
-from posse_training.replay.page import read_replay, write_replay
-from posse_training.replay.recording import record
+from posse_training.replay import Replay, join, read_replay, record, write_replay
 
 
 @dataclass(frozen=True, kw_only=True)

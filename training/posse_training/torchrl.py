@@ -1,4 +1,4 @@
-"""A batch of worlds as one TorchRL environment.
+"""With TorchRL: a batch of worlds as one environment. Needs the extra ``training``.
 
 TorchRL steps batches and resets parts of them, as the engine does, so the adapter only renames.
 E = worlds, N = trackers, F = observation length, m = message size::
@@ -18,17 +18,23 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-import torch
-from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
+from posse_training.errors import require
 
-import posse
-from posse.adapters.actions import MOTIONS, agent_names, single_action_space
-from posse.signals.layout import StateLayout
-from posse_baselines import PolicyError
-from posse_baselines.safeguard import Guard
+require("training", "torch", "tensordict", "torchrl")
+
+import numpy as np  # noqa: E402
+import torch  # noqa: E402
+from tensordict import TensorDict, TensorDictBase  # noqa: E402
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded  # noqa: E402
+from torchrl.envs import EnvBase  # noqa: E402
+
+import posse  # noqa: E402
+from posse.adapters.actions import MOTIONS, agent_names, single_action_space  # noqa: E402
+from posse.signals.layout import StateLayout  # noqa: E402
+from posse_baselines import PolicyError  # noqa: E402
+from posse_baselines.safeguard import Guard  # noqa: E402
+
+__all__ = ["PosseEnv"]
 
 TRACKERS: Final = "agents"
 """Group of the trackers, named as in TorchRL's multi-agent examples."""
@@ -139,19 +145,15 @@ class PosseEnv(EnvBase):
         ``seed`` and ``options`` (start poses) of :meth:`reset` are those of
         :meth:`posse.Batch.reset`.
         """
-        options = kwargs.get("options")
-        all_worlds = False
-        marks = None if tensordict is None else tensordict.get("_reset", None)
+        seed, options = kwargs.get("seed", self._seed), kwargs.get("options")
         mask = np.ones(self.batch.num_worlds, np.bool_)
-        if marks is not None and not bool(marks.all()):
-            mask = self._array(marks.reshape(self.batch.num_worlds))
-            options = {**(options or {}), "reset_mask": mask}
-            seed = kwargs.get("seed")
-        else:
-            seed, all_worlds = kwargs.get("seed", self._seed), True
-        observations = self.batch.reset(seed=seed, options=options)
-        if all_worlds:
+        marks = None if tensordict is None else tensordict.get("_reset", None)
+        if marks is None or bool(marks.all()):
             self._seed = None
+        else:
+            mask = self._array(marks.reshape(self.batch.num_worlds))
+            seed, options = kwargs.get("seed"), {**(options or {}), "reset_mask": mask}
+        observations = self.batch.reset(seed=seed, options=options)
         if self._guard is not None:
             self._guard.restart(mask)
             self._guard.follow(observations[:, self._rows[TRACKERS]])
