@@ -201,12 +201,6 @@ def test_observations_of_another_shape_are_refused(name: str) -> None:
         policy.act(batch.reset()[:2], memory)
 
 
-def test_a_team_with_an_agent_for_a_target_is_not_driven_by_rollout() -> None:
-    batch = posse.batch("constant", 1, target_motion="agent")
-    with pytest.raises(PolicyError, match=r"target .* is an agent"):
-        rollout(batch, load("idle"))
-
-
 # --- PettingZoo ----------------------------------------------------------------------------------
 
 

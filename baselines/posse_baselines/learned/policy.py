@@ -6,7 +6,6 @@ interprets numbers and JSON and never runs code.
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 from collections.abc import Mapping
@@ -93,9 +92,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         )
         self.safeguard = safeguard
         self._flat = network.flat()
-        self._set_card(card)
-
-    def _set_card(self, card: Mapping[str, Any]) -> None:
         if not isinstance(card, Mapping):
             raise PolicyError(f"its card must be a mapping of names to values, not {card!r:.80}")
         name, side = card.get("name", "learned"), card.get("side", "trackers")
@@ -114,9 +110,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         Raises:
             PolicyError: An invalid card.
         """
-        other = copy.copy(self)
-        other._set_card(card)
-        return other
+        return LearnedPolicy(self.network, self.encoding, card, self.adviser, self.safeguard)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` worlds.

@@ -191,9 +191,7 @@ class Beliefs(OwnArrays):
         v = {name: view.reshape(self.rows, *view.shape[2:]) for name, view in views.items()}
         told, window = self._told, len(self._told.fixed) - 1
         heading, position = _complex(v["heading"]), _complex(v["position"])
-        own = np.asarray(v["number"], np.int64)
-
-        rows = np.arange(self.rows)
+        own, rows = np.asarray(v["number"], np.int64), np.arange(self.rows)
         told.heard[-1, rows, own] = True
         told.robots[-1, rows, own] = _poses(position, heading, v["speed"], v["turn_rate"])
         if self.layout.neighbours:
@@ -201,9 +199,9 @@ class Beliefs(OwnArrays):
             place = position[:, None] + v["neighbour_range"] * _complex(v["neighbour_bearing"]) * heading[:, None]
             turned = _complex(v["neighbour_heading"]) * heading[:, None]
             known = np.nonzero((age >= 0) & (age <= window))
-            at = window - age[known].astype(np.int64), known[0], v["neighbour_number"][known].astype(np.int64)
-            told.heard[at] = True
-            told.robots[at] = _poses(place, turned, v["neighbour_speed"], v["neighbour_turn_rate"])[known]
+            which = window - age[known].astype(np.int64), known[0], v["neighbour_number"][known].astype(np.int64)
+            told.heard[which] = True
+            told.robots[which] = _poses(place, turned, v["neighbour_speed"], v["neighbour_turn_rate"])[known]
         age = np.rint(v["target_age"] / self.dt)
         self.age = np.where(v["target_known"] > 0, age, NEVER)
         fresh = (v["target_known"] > 0) & (v["target_range"] >= 0) & (self.step - age > self.newest)
@@ -214,8 +212,8 @@ class Beliefs(OwnArrays):
         late = np.maximum(age - window, 0.0) * self.dt
         place = place + late * self.now.scenario.target_speed * theta
         fix = np.stack([place, theta, frame, velocity], axis=-1)
-        of = window - np.minimum(age, window).astype(np.int64)[fresh], np.flatnonzero(fresh)
-        told.fixed[of], told.fix[of] = True, fix[fresh]
+        at = window - np.minimum(age, window).astype(np.int64)[fresh], np.flatnonzero(fresh)
+        told.fixed[at], told.fix[at] = True, fix[fresh]
         return own
 
     def _write(self, seen: Records, moment: int) -> None:
