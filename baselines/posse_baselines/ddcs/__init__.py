@@ -5,12 +5,12 @@ layer                 where it is
 ====================  ===============================================================================================
 monitoring            :mod:`~posse_baselines.ddcs.monitoring`: an estimate of the target, a table of team-mates
 target tracking       :mod:`~posse_baselines.ddcs.roles`: leader and slots; :mod:`~posse_baselines.ddcs.motion`: the
-                      four tasks and their laws; :mod:`~posse_baselines.ddcs.searching`
+                      four tasks and their laws
 motor actuation       :mod:`~posse_baselines.ddcs.actuation`, then :mod:`posse_baselines.laws.safeguard`
 ====================  ===============================================================================================
 
-:mod:`~posse_baselines.ddcs.baseline` says what the baseline PNGL + l-φ is; :mod:`~posse_baselines.ddcs.step` is one
-control step of one tracker, in order.
+:mod:`~posse_baselines.ddcs.baseline` is where to begin: one control step of one tracker, in order, and what makes it
+PNGL + l-φ.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The actuation layer, before the safeguard: what is near, ways past it, and commands that are executed late.
+"""The actuation layer around the safeguard: what is near, ways past it, and commands that are executed late.
 
 **Surroundings.** The nearby discs of a tracker: known ones, and unexplained echoes of the sonar.
 
@@ -17,10 +17,11 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import MOST_WAITING, Team
-from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
+from posse_baselines.ddcs.memory import MOST_WAITING, Seen, Team, Work, for_each, read_body
+from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after, update_mates, watch_target
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
-from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls, to_wall
+from posse_baselines.laws.guidance import regulate, write_motion
+from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls, safe_velocity, to_wall
 from posse_baselines.laws.steering import slot_velocity
 
 _SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
@@ -242,14 +243,56 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
 
 
 @compiled
-def make_up(team: Team, me: Record, speed: float, omega: float) -> tuple[float, float]:
-    """Return the command (m/s, rad/s) that makes up for the lag, and remember it until it is executed."""
-    followed, share, delay = team.world.followed, team.settings.foresight, delay_of(team)
-    if followed < 1.0 and share > 0.0:
-        more = share * (1.0 / followed - 1.0)
-        speed += more * (speed - me.speed)
-        omega += more * (omega - me.omega)
+def execute(team: Team, me: Record, speed: float, omega: float, action: FloatArray) -> None:
+    """Write a command (m/s, rad/s), made up for the lag, into an action, and remember it until it is executed."""
+    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), delay_of(team)
+    speed += more * (speed - me.speed)
+    omega += more * (omega - me.omega)
     if delay > 0:
         kept = complex(clip(speed, 0.0, me.max_speed), clip(omega, -me.max_omega, me.max_omega))
         me.waiting[me.step % delay] = kept
-    return speed, omega
+    write_motion(action, speed, omega, me.max_speed, me.max_omega)
+    me.step += 1
+
+
+# --- wanted velocities that are not the script's -------------------------------------------------
+
+
+@compiled
+def correct(me: Record, correction: complex) -> None:
+    """Add to the wanted velocity, ahead and to the left, in shares of the greatest speed, which also limits the sum.
+
+    The command changes by what regulation of the two velocities differs by, so that a small
+    correction changes little, whatever law the command came from.
+    """
+    if correction == 0j:
+        return
+    wish = me.wish + scaled(correction * me.heading, me.max_speed)
+    excess = max(1.0, length(wish) / max(me.max_speed, length(me.wish)))
+    wish = complex(wish.real / excess, wish.imag / excess)
+    old_speed, old_omega = regulate(me, me.wish, 0.0)
+    speed, omega = regulate(me, wish, 0.0)
+    me.wish = wish
+    me.wish_speed += speed - old_speed
+    me.wish_omega += omega - old_omega
+
+
+@compiled
+def guard(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray) -> None:
+    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten.
+
+    It is relative to the observed heading, and carried out from the pose at which the command is executed.
+    """
+    read_body(team, me, row)
+    watch_target(team, me, row)
+    update_mates(team, me, mates, row)
+    wanted = complex(float(action[0]), float(action[1]))
+    wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
+    foresee(team, me)
+    discs = work.discs[: surround(team, me, mates, row, work.discs)]
+    velocity, _ = safe_velocity(me, discs, wanted, work.plays)
+    speed, omega = regulate(me, velocity, 0.0)
+    execute(team, me, speed, omega, action)
+
+
+guard_all = for_each(guard)

@@ -1,11 +1,13 @@
-"""The baseline, PNGL + l-φ, and the other members of the DDCS family: one program, different settings.
+"""The baseline, PNGL + l-φ: one control step, in order, and the settings that make it and its family.
 
-What ``pngl-l-phi`` does in a control step (:mod:`~posse_baselines.ddcs.step`), equation numbers of the paper:
+A step of one tracker is :func:`propose`, monitoring and tracking, then :func:`carry_out`, actuation. Between the two, a
+wanted velocity may be corrected: before the safeguard, so that a corrected team avoids contact as well as the team
+itself does. What ``pngl-l-phi`` does, with equation numbers of the paper:
 
 ===============================  ======================================================  =======================
 who, when                        law                                                     where
 ===============================  ======================================================  =======================
-everyone, target unknown         explores what the team has not covered yet              ``searching.wander``
+everyone, target unknown         explores what the team has not covered yet              ``motion.wander``
 leader, far (converging)         PNGL, θ = K σ + c, at full speed: (5), (6), (12)        ``motion.pursue``,
                                                                                          ``laws.guidance``
 leader, near (flocking)          PNGL, the speed of (13) with a correction of the range  ``motion.pursue``
@@ -26,7 +28,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
+from posse.numeric import FloatArray, Record, Records, compiled
+from posse_baselines.ddcs.actuation import correct, detour, execute, foresee, surround
+from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, read_body
+from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
+from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task
+from posse_baselines.ddcs.roles import choose_slot, settle_lead
+from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, NO_EXCHANGE, SEARCHING, Settings
+from posse_baselines.laws.guidance import regulate
+from posse_baselines.laws.safeguard import safe_velocity
 
 BASELINE: Final = Settings(
     model="centralized",
@@ -58,3 +68,50 @@ FAMILY: Final[dict[str, Settings]] = {
     "ddcs-no-radio": Settings(radio=False),
 }
 """The members of the DDCS family, the baseline first."""
+
+
+@compiled
+def propose(
+    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, proposal: FloatArray
+) -> None:
+    """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
+    # Monitoring
+    read_body(team, me, row)
+    watch_target(team, me, row)
+    update_mates(team, me, mates, row)
+    look_around(team, me, mates, seen)
+    foresee(team, me)
+    # Tracking
+    if team.settings.model == CENTRALIZED:
+        settle_lead(team, me, mates)
+    if me.known == 0:
+        me.slot = -1
+        if me.task != SEARCHING:
+            begin_search(team, me, seen)
+    elif me.slot < 0 or me.step % max(1, round(team.settings.replan_time / team.world.dt)) == 0:
+        choose_slot(team, me, mates, work)
+    me.task = next_task(team, me, mates)
+    move(team, me, mates, seen)
+    own = me.wish * me.heading.conjugate()
+    proposal[0], proposal[1] = own.real / me.max_speed, own.imag / me.max_speed
+
+
+@compiled
+def carry_out(
+    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray
+) -> None:
+    """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
+    correct(me, complex(float(action[0]), float(action[1])))
+    discs = work.discs[: surround(team, me, mates, row, work.discs)]
+    velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
+    if team.settings.detour > 0.0 and me.task != FLOCKING:
+        velocity = detour(team, me, discs, velocity)
+    turned = velocity != me.wish
+    velocity, evades = safe_velocity(me, discs, velocity, work.plays)
+    if turned or evades:
+        speed, omega = regulate(me, velocity, 0.0)
+    execute(team, me, speed, omega, action)
+    write_message(team, me, row, action)
+
+
+propose_all, carry_out_all = for_each(propose), for_each(carry_out)

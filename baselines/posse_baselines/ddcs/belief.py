@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import GRID, Team
+from posse_baselines.ddcs.memory import GRID, Seen, Team, Work, for_each
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.ddcs.searching import age_of
+from posse_baselines.ddcs.motion import age_of
 from posse_baselines.ddcs.settings import SEARCHING
 from posse_baselines.laws.geometry import length, scaled, vector
 from posse_baselines.laws.steering import slot_velocity
@@ -61,9 +58,8 @@ def put_soft(me: Record, v: complex, scale: float, out: FloatArray) -> None:
 
 
 @compiled
-def write_belief(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], out: FloatArray) -> None:
-    """Write the belief (BELIEF_SIZE,) of one tracker after it planned."""
-    out[:] = 0.0
+def believe(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, out: FloatArray) -> None:
+    """Write the belief (BELIEF_SIZE,) of one tracker after it planned; ``out`` is 0 before."""
     if me.known != 0:
         b = out[TARGET_AT:]
         b[0] = 1.0
@@ -115,7 +111,7 @@ def _write_mates(team: Team, me: Record, mates: Records, out: FloatArray) -> Non
 
 
 @compiled
-def _write_looks(team: Team, me: Record, seen: npt.NDArray[np.uint16], out: FloatArray) -> None:
+def _write_looks(team: Team, me: Record, seen: Seen, out: FloatArray) -> None:
     """Write how long ago the team covered the places around; 0 beyond the area."""
     world = team.world
     scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
@@ -125,3 +121,6 @@ def _write_looks(team: Team, me: Record, seen: npt.NDArray[np.uint16], out: Floa
         j = math.floor((there.imag + world.area_y) * scale_y)
         if 0 <= i < GRID and 0 <= j < GRID:
             out[k] = age_of(team, me, seen, i, j, False) / team.settings.stale_after
+
+
+believe_all = for_each(believe)

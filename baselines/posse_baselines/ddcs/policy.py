@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays
-from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.ddcs.belief import BELIEF_SIZE
+from posse_baselines.ddcs.baseline import FAMILY, carry_out_all, propose_all
+from posse_baselines.ddcs.belief import BELIEF_SIZE, believe_all
 from posse_baselines.ddcs.memory import Kernel, Minds, minds_for
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.ddcs.step import carry_out_all, propose_all
 from posse_baselines.laws.offsets import in_units, unit_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
 
@@ -93,8 +92,12 @@ class DDCS(OwnArrays, BasePolicy):
         believes, in the order of :mod:`posse_baselines.ddcs.belief`: (E, N, 2 + BELIEF_SIZE). The first half of
         :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
         """
-        proposals = np.zeros((*memory.minds.me.shape, 2 + BELIEF_SIZE if believes else 2), np.float32)
-        return self._run(propose_all, observations, memory, proposals), memory
+        shape = memory.minds.me.shape
+        proposals = self._run(propose_all, observations, memory, np.zeros((*shape, 2), np.float32))
+        if believes:
+            beliefs = self._run(believe_all, observations, memory, np.zeros((*shape, BELIEF_SIZE), np.float32))
+            proposals = np.concatenate([proposals, beliefs], axis=-1)
+        return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
