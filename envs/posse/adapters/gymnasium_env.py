@@ -108,11 +108,13 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
     def _info(self, score: float, terms: FloatArray) -> dict[str, Any]:
         """Return the info of a score and terms (1, rows, K)."""
-        own = terms[0, self._rows].T
-        working = self.batch.working[0, self._rows] if self.scenario.breaks else None
+        own, working = (
+            terms[0, self._rows].T.copy(),
+            self.batch.working[0, self._rows] if self.scenario.breaks else None,
+        )
         if own.ndim == 1:  # of one tracker: plain numbers
             return self._infos.build(score, own.tolist(), None if working is None else bool(working), self._metrics())
-        return self._infos.build(score, own.copy(), working, self._metrics())
+        return self._infos.build(score, own, working, self._metrics())
 
 
 class SoloEnv(TeamEnv):
