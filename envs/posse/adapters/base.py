@@ -16,7 +16,7 @@ from posse.engine.arguments import check_choice, options_of
 from posse.engine.batch import Batch, Infos
 from posse.engine.kernels import Results
 from posse.engine.opponent import TargetPolicy, batch
-from posse.numeric import FloatArray, OwnArrays
+from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
@@ -146,13 +146,12 @@ class BatchEnv:
             self._renderer = None
 
 
-class WorldEnv(OwnArrays, BatchEnv):
+class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._infos = Infos(self.scenario, 0.0)
-        self._results = self.batch._new_results()  # of a step, which the next one overwrites
         self.state_layout = StateLayout(self.scenario)
 
     def state(self) -> FloatArray:
@@ -172,10 +171,11 @@ class WorldEnv(OwnArrays, BatchEnv):
         return super()._start(seed, options)[0, self._rows]
 
     def _advance(self, actions: FloatArray) -> Results:
-        """Perform a control step by valid actions and return what came of it, until the next one."""
-        self.batch._advance(actions, self._results)
+        """Perform a control step by valid actions and return what came of it."""
+        results = self.batch._new_results()
+        self.batch._advance(actions, results)
         self._show()
-        return self._results
+        return results
 
     def _metrics(self) -> dict[str, float] | None:
         """Return every metric of the episode, once it is over."""

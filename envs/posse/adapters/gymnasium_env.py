@@ -104,14 +104,11 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         )
         each = rewards[0].tolist()
         info = self._info(scores.item(), terms)
-        return observations[0, self._rows].copy(), sum(each) / len(each), terminated.item(), truncated.item(), info
+        return observations[0, self._rows], sum(each) / len(each), terminated.item(), truncated.item(), info
 
     def _info(self, score: float, terms: FloatArray) -> dict[str, Any]:
         """Return the info of a score and terms (1, rows, K)."""
-        own, working = (
-            terms[0, self._rows].T.copy(),
-            self.batch.working[0, self._rows] if self.scenario.breaks else None,
-        )
+        own, working = terms[0, self._rows].T, self.batch.working[0, self._rows] if self.scenario.breaks else None
         if own.ndim == 1:  # of one tracker: plain numbers
             return self._infos.build(score, own.tolist(), None if working is None else bool(working), self._metrics())
         return self._infos.build(score, own, working, self._metrics())

@@ -108,7 +108,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         if batch._over:
             self.agents = []
         return (
-            dict(zip(agents, observations[0].copy())),  # noqa: B905  equal lengths, in the hot path
+            dict(zip(agents, observations[0])),  # noqa: B905  equal lengths, in the hot path
             dict(zip(agents, rewards[0].tolist())),  # noqa: B905
             dict.fromkeys(agents, terminated.item()),
             dict.fromkeys(agents, truncated.item()),
