@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +14,13 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.batch import Batch, Infos
-from posse.engine.kernels import Results
 from posse.engine.opponent import TargetPolicy, batch
-from posse.numeric import FloatArray
+from posse.numeric import FloatArray, OwnArrays
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
+
+_ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
 class BatchEnv:
@@ -118,10 +119,6 @@ class BatchEnv:
         self._show()
         return observations
 
-    def _no_terms(self) -> FloatArray:
-        """Return the terms (E, rows, K) of a reset."""
-        return np.zeros((*self.batch.observation_shape[:2], len(self.batch.term_names)), np.float32)
-
     def _show(self) -> None:
         """Draw the first world in the window, in the mode "human"."""
         if self.render_mode == "human":
@@ -146,13 +143,31 @@ class BatchEnv:
             self._renderer = None
 
 
-class WorldEnv(BatchEnv):
+class WorldEnv(OwnArrays, BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._infos = Infos(self.scenario, 0.0)
+        self._breakable = self.scenario.breaks > 0
         self.state_layout = StateLayout(self.scenario)
+        self._allocate()
+
+    def _allocate(self) -> None:
+        """Allocate the results of a step, which the next one overwrites, and find the agents' part of them."""
+        self._results, rows = self.batch._new_results(), self._rows
+        self._own = self._results._replace(
+            observations=self._results.observations[0, rows],  # (..., F)
+            rewards=self._results.rewards[0, rows, ...].reshape(-1),  # (rows,)
+            terms=self._results.terms[0, rows].T,  # (K, ...)
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in super().__getstate__().items() if name not in _ALLOCATED}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._allocate()
 
     def state(self) -> FloatArray:
         """Return the full state of the world, (S,) float32."""
@@ -168,15 +183,17 @@ class WorldEnv(BatchEnv):
         """Start an episode and return the agents' observations (..., F)."""
         if "reset_mask" in options_of(options):
             raise ValueError("unknown option 'reset_mask': an environment of one world has none")
-        return super()._start(seed, options)[0, self._rows]
+        observations: FloatArray = super()._start(seed, options)[0, self._rows]
+        for array in self._results[2:]:
+            array[...] = 0
+        return observations
 
-    def _advance(self, actions: FloatArray) -> Results:
-        """Perform a control step by valid actions and return what came of it."""
-        results = self.batch._new_results()
-        self.batch._advance(actions, results)
-        self._show()
-        return results
+    def _advance(self, actions: FloatArray) -> None:
+        """Perform a control step by valid actions."""
+        self.batch._advance(actions, self._results)
+        if self.render_mode is not None:
+            self._show()
 
-    def _metrics(self) -> dict[str, float] | None:
-        """Return every metric of the episode, once it is over."""
-        return {name: float(v[0]) for name, v in self.batch.metrics().items()} if self.batch._over else None
+    def _metrics(self) -> dict[str, float]:
+        """Return every metric of the episode."""
+        return {name: float(v[0]) for name, v in self.batch.metrics().items()}

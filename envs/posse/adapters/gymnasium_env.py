@@ -88,7 +88,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         observation = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
-        return observation, self._info(0.0, self._no_terms())
+        return observation, self._info()
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -97,21 +97,23 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An action out of its space; nothing is changed.
         """
-        self.batch.check_running()
+        batch, own = self.batch, self._own
+        batch.check_running()
         motions = as_motions("action", action, self._shape, self._discrete)
-        observations, rewards, terms, scores, terminated, truncated = self._advance(
-            in_box(motions.reshape(self._rows_shape), self.batch.clip_actions)
-        )
-        each = rewards[0].tolist()
-        info = self._info(scores.item(), terms)
-        return observations[0, self._rows], sum(each) / len(each), terminated.item(), truncated.item(), info
+        self._advance(in_box(motions.reshape(self._rows_shape), batch.clip_actions))
+        rewards = own.rewards.tolist()
+        ends = (own.terminated.item(), own.truncated.item()) if batch._over else (False, False)
+        return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
-    def _info(self, score: float, terms: FloatArray) -> dict[str, Any]:
-        """Return the info of a score and terms (1, rows, K)."""
-        own, working = terms[0, self._rows].T, self.batch.working[0, self._rows] if self.scenario.breaks else None
-        if own.ndim == 1:  # of one tracker: plain numbers
-            return self._infos.build(score, own.tolist(), None if working is None else bool(working), self._metrics())
-        return self._infos.build(score, own, working, self._metrics())
+    def _info(self) -> dict[str, Any]:
+        """Return the info of the last step or reset."""
+        own = self._own
+        terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
+        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
+        if self._breakable:
+            working = self.batch.working[0, self._rows]
+            info["working"] = working if working.ndim else bool(working)
+        return info
 
 
 class SoloEnv(TeamEnv):

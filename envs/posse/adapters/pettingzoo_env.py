@@ -67,6 +67,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
         self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
         self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
+        self._none_ended = dict.fromkeys(self.possible_agents, False)
         self.np_random = np.random.default_rng(settings.get("seed"))  # for wrappers; no world draws from it
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -88,7 +89,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        return dict(zip(self.agents, observations, strict=True)), self._infos_of(0.0, self._no_terms())
+        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
 
     def step(
         self, actions: Mapping[str, Any]
@@ -99,44 +100,60 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
-        agents, batch = self.agents, self.batch
+        agents, batch, own = self.agents, self.batch, self._own
         batch.check_running()
-        observations, rewards, terms, scores, terminated, truncated = self._advance(
-            in_box(self._read(actions), batch.clip_actions, self._place)
-        )
-        infos = self._infos_of(scores.item(), terms)
+        self._advance(in_box(self._read(actions), batch.clip_actions, self._place))
+        terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
         if batch._over:
+            (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
         return (
-            dict(zip(agents, observations[0])),  # noqa: B905  equal lengths, in the hot path
-            dict(zip(agents, rewards[0].tolist())),  # noqa: B905
-            dict.fromkeys(agents, terminated.item()),
-            dict.fromkeys(agents, truncated.item()),
-            infos,
+            dict(zip(agents, own.observations.copy())),  # noqa: B905  equal lengths, in the hot path
+            dict(zip(agents, own.rewards.tolist())),  # noqa: B905
+            terminations,
+            truncations,
+            self._infos_of(agents),
         )
 
-    def _infos_of(self, score: float, terms: FloatArray) -> _AgentInfos:
-        """Return the infos of a score and terms (1, rows, K)."""
-        agents, metrics = self.agents, self._metrics()
-        # A target, which is last, never breaks.
-        working = [*self.batch.working[0].tolist(), True] if self.scenario.breaks else [None] * len(agents)
-        each = zip(agents, terms[0].tolist(), working)  # noqa: B905  `working` may be longer
-        return {agent: self._infos.build(score, own, works, metrics) for agent, own, works in each}
+    def _infos_of(self, agents: list[str]) -> _AgentInfos:
+        """Return the infos of the last step or reset."""
+        own = self._own
+        metrics = self._metrics() if self.batch._over else None
+        infos = self._infos.by_agent(agents, own.scores.item(), metrics, own.terms.T.tolist())
+        if self._breakable:
+            for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
+                infos[agent]["working"] = works  # a target never breaks
+        return infos
+
+    def _allocate(self) -> None:
+        super()._allocate()
+        self._actions = np.zeros(self.batch.action_shape, np.float32)
+        # Assignment to a memoryview checks type and shape fastest.
+        self._action_of = [memoryview(row) for row in self._actions[0]]
 
     def _read(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return actions by agent as an array, whose range is not checked; ValueError names a wrong one."""
-        agents, shape = self.agents, self.action_spaces[self.agents[0]].shape
+        agents = self.agents
+        try:
+            if self._discrete or type(actions) is not dict or len(actions) != len(agents):
+                raise TypeError
+            for agent, row in zip(agents, self._action_of):  # noqa: B905  equal lengths, in the hot path
+                row[:] = actions[agent]
+            return self._actions
+        except (KeyError, TypeError, ValueError, BufferError):  # of another type, or invalid
+            pass
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
-        if actions.keys() != self.action_spaces.keys():
-            known = f"agents are: {', '.join(agents)}"
-            for agent in actions:
-                if agent not in agents:
-                    raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
-            missing = next(agent for agent in agents if agent not in actions)
-            raise ValueError(f"no action for {missing}: every agent needs one; {known}")
-        rows = [as_motions(f"action of {agent}", actions[agent], shape, self._discrete) for agent in agents]
-        return np.array(rows)[None]
+        known = f"agents are: {', '.join(agents)}"
+        for agent in actions:
+            if agent not in agents:
+                raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
+        for agent, row in zip(agents, self._actions[0], strict=True):
+            if agent not in actions:
+                raise ValueError(f"no action for {agent}: every agent needs one; {known}")
+            shape = self.action_spaces[agent].shape
+            row[...] = as_motions(f"action of {agent}", actions[agent], shape, self._discrete)
+        return self._actions
 
     def _place(self, _: int, row: int, k: int) -> str:
         parts = ("speed", "turn rate")

@@ -75,8 +75,8 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         super().reset(seed=None if seed is None else int(seed))
         mask = options_of(options).get("reset_mask")
         begun = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
-        working = self.batch.working if self.scenario.breaks else None
-        infos = self._own(self.batch.infos.build(np.zeros(self.num_envs), self._no_terms().transpose(2, 0, 1), working))
+        terms = np.zeros((*self.batch.observation_shape[:2], len(self.batch.term_names)), np.float32)
+        infos = self._own(self.batch._infos_of(np.zeros(self.num_envs), terms))
         return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:

@@ -46,7 +46,7 @@ _RECYCLED_FROM: Final = 1 << 14
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
 _DERIVED: Final = frozenset(
-    ("_declared", "_own_terms", "_kernel", "_orders", "_tables", "_scratch", "_returned", "infos")
+    ("_declared", "_own_terms", "_kernel", "_orders", "_tables", "_scratch", "_returned", "_infos")
 )
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
@@ -82,17 +82,27 @@ class Infos:
         names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
         self._template = dict.fromkeys(names, zero)
 
-    def build(self, score: Any, terms: Any, working: Any, metrics: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return an info: ``terms`` (K, ...) in order, ``working`` unless it is ``None``, ``metrics`` at the end."""
+    def build(self, score: Any, metrics: Mapping[str, Any] | None, terms: Any = None) -> dict[str, Any]:
+        """Return an info; ``metrics`` by name where the episode ends, ``terms`` (K, ...) in the order of the names."""
         info = self._template.copy()
         info["score"] = score
-        for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
-            info[key] = terms[k]
-        if working is not None:
-            info["working"] = working
         if metrics is not None:
             info.update((f"metrics/{name}", value) for name, value in metrics.items())
+        if terms is not None:
+            for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
+                info[key] = terms[k]
         return info
+
+    def by_agent(
+        self, agents: list[str], score: float, metrics: Mapping[str, float] | None, terms: list[list[float]]
+    ) -> dict[str, dict[str, Any]]:
+        """Return the infos of agents by name, which differ in their own terms (rows, K)."""
+        common, rewards, infos = self.build(score, metrics), self._rewards, {}
+        for agent, own in zip(agents, terms):  # noqa: B905  equal lengths, in the hot path
+            infos[agent] = info = common.copy()
+            for key, k in rewards:
+                info[key] = own[k]
+        return infos
 
 
 class Batch:
@@ -117,7 +127,6 @@ class Batch:
     Attributes:
         arrays: The state of the worlds; writing to it changes them.
         layout: Position of each field in an observation.
-        infos: Builds the infos.
         term_names: Names of the reward terms, in the order in which they are reported.
         observation_shape: (E, rows, F); rows = N, plus one if the target is an agent.
         action_shape: (E, rows, 2 + message_size).
@@ -174,7 +183,7 @@ class Batch:
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
-        self.infos = Infos(self.scenario, zeros)
+        self._infos = Infos(self.scenario, zeros)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
@@ -426,8 +435,7 @@ class Batch:
         if over:
             ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        working = self.working if self.scenario.breaks else None
-        infos = self.infos.build(scores, terms.transpose(2, 0, 1), working, metrics)
+        infos = self._infos_of(scores, terms, metrics)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
@@ -440,6 +448,15 @@ class Batch:
                 self._started = False  # only a reset helps
                 raise
         return observations, rewards, terminated, truncated, infos
+
+    def _infos_of(
+        self, scores: npt.NDArray[Any], terms: FloatArray, metrics: Mapping[str, npt.NDArray[Any]] | None = None
+    ) -> dict[str, Any]:
+        """Return the infos of scores (E,) and terms (E, rows, K), with ``metrics`` where an episode ends."""
+        infos = self._infos.build(scores, metrics, terms.transpose(2, 0, 1))
+        if self.scenario.breaks > 0:
+            infos["working"] = self.working
+        return infos
 
     def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
         """Advance every world by valid actions, or execute its order; return how many episodes are over.
