@@ -23,7 +23,7 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
-    Pass,
+    Fixed,
     Results,
     direct,
     draw_anew,
@@ -45,9 +45,7 @@ _RECYCLED_FROM: Final = 1 << 14
 """Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(
-    ("_declared", "_own_terms", "_kernel", "_orders", "_tables", "_scratch", "_returned", "_infos")
-)
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_returned", "_infos"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -178,8 +176,8 @@ class Batch:
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        self._tables = tables_of(self.scenario, self._declared.reward_terms)
-        self._scratch = new_scratch(SCRATCH, threads)
+        tables = tables_of(self.scenario, self._declared.reward_terms)
+        self._fixed = Fixed(tables, self.arrays, new_scratch(SCRATCH, threads))
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
@@ -300,7 +298,7 @@ class Batch:
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
                 theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
-        draw_anew(self._tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        draw_anew(self._fixed.tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
 
@@ -379,7 +377,7 @@ class Batch:
             x, y, heading = np.moveaxis(pose[chosen], -1, 0)
             records["x"][chosen], records["y"][chosen] = x, y
             records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
-        config, n = self._tables.config, self.scenario.num_trackers
+        config, n = self._fixed.tables.config, self.scenario.num_trackers
         e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
         if e < 0:
             return
@@ -463,13 +461,15 @@ class Batch:
 
         Several threads share the worlds. Episodes that end are not started anew.
         """
-        through = Pass(self._tables, self.arrays, actions, self._orders if orders is None else orders, results)
-        scratch, threads = self._scratch, len(self._scratch)
+        if orders is None:
+            orders = self._orders
+        fixed = self._fixed
+        threads = len(fixed.scratch)
         if threads == 1:  # for one world, the other way takes a tenth longer
-            over = self._kernel(through, scratch, 0, 0, self.num_worlds)
+            over = self._kernel(fixed, actions, orders, results, 0, 0, self.num_worlds)
         else:
-            shares = over_worlds(self._kernel, (through, scratch), self.num_worlds, self.scenario.num_agents, threads)
-            over = sum(shares)
+            arguments = fixed, actions, orders, results
+            over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)

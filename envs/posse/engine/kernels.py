@@ -72,6 +72,15 @@ class Results(NamedTuple):
     """(E,)."""
 
 
+class Fixed(NamedTuple):
+    """What a batch passes to its kernel every time."""
+
+    tables: Tables
+    worlds: WorldArrays
+    scratch: Records
+    """(threads,) :data:`SCRATCH`."""
+
+
 class Pass(NamedTuple):
     """What a pass over the worlds reads and writes."""
 
@@ -226,10 +235,13 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     made = generated_for(declarations)
 
     @kernel
-    def advance(through: Pass, scratch: Records, thread: int, first: int, end: int) -> int:
-        s = scratch[nonnegative(thread)]
+    def advance(
+        fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
+    ) -> int:
+        through = Pass(fixed.tables, fixed.worlds, actions, orders, results)
+        s = fixed.scratch[nonnegative(thread)]
         if s.prepared[0] == ZERO:
-            lay_out_constants(through.tables.config[0], through.tables.beams, s)
+            lay_out_constants(fixed.tables.config[0], fixed.tables.beams, s)
             s.prepared[0] = ONE
         over = 0
         for e in range(nonnegative(first), end, TOGETHER):
