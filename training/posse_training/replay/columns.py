@@ -46,18 +46,6 @@ _SCORE: Final = 0.0001
 _BELIEF: Final = 0.01
 _FIX: Final = 0.01  # m, of a measured position
 _OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
-STATES: Final = (
-    *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
-    *("tracker_sees", "tracker_slot", "tracker_onsets"),
-    *("tracker_broken_at", "tracker_sensor_dead_from", "tracker_radio_dead_from"),
-    *("odometry_x", "odometry_y", "odometry_heading"),
-    *("tracker_fix_step", "tracker_fix_x", "tracker_fix_y", "tracker_fix_cos", "tracker_fix_sin", "heard_step"),
-    *("world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin"),
-    *("world_frame_cos", "world_frame_sin", "world_pressed", "world_score"),
-    *("world_detected_at", "world_settled_at", "world_recovered_at"),
-    *("world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target"),
-)
-"""Names of the state arrays that columns and events are made of."""
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
