@@ -33,12 +33,12 @@ class TrainedSplitError(UserError, ValueError):
     """An evaluation on worlds that the policy was trained on."""
 
 
-class TimeLimitError(UserError, RuntimeError):
-    """An evaluation that exceeded its time limit."""
-
-
 class PlayError(UserError, RuntimeError):
     """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
+
+
+class TimeLimitError(PlayError):
+    """A policy that exceeded the time limit."""
 
 
 class ResultFileError(UserError, ValueError):

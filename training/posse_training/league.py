@@ -328,15 +328,13 @@ def write_results(found: League) -> None:
 def draw_matrix(found: League) -> list[Path]:
     """Write the matrix of scores as PNG and SVG to the league's folder; return the files."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
-    from posse_training.style import RC, WIDTH, note, plain, save
+    from posse_training.style import RC, WIDTH, note, plain, save, subplots
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
     scores = [[found.at(a, b).score for b in targets] for a in teams]
     with mpl.rc_context({**RC, "axes.grid": False}):
-        figure = Figure(figsize=(WIDTH, 1.4 + 0.42 * len(teams)), layout="constrained")
-        axis = figure.subplots()
+        figure, axis = subplots(1, 1, (WIDTH, 1.4 + 0.42 * len(teams)))
         image = axis.imshow([[v.value for v in row] for row in scores], vmin=0, vmax=1, cmap="cividis", aspect="auto")
         axis.set_xticks(range(len(targets)), targets, rotation=35, ha="right")
         axis.set_yticks(range(len(teams)), teams)

@@ -77,18 +77,16 @@ Pairs = Annotated[dict[str, Any], _words(dict, settings_of, words_of, "KEY=VALUE
 """Type of an option that takes ``KEY=VALUE ...``."""
 Changes = Annotated[Pairs, tyro.conf.arg(name="set")]
 """Type of the option ``--set``."""
-Names = Annotated[str, _words(str, ",".join, lambda names: names.split(","), "NAME ...", "+")]
+_NAMES: Final = _words(
+    (str, type(None)),
+    lambda words: None if words == ["None"] else ",".join(words),
+    lambda names: str(names).split(","),
+    "NAME ...",
+    "+",
+)
+Names = Annotated[str, _NAMES]
 """Type of an option that takes one name or several; in Python a text with commas between."""
-MaybeNames = Annotated[
-    str | None,
-    _words(
-        (str, type(None)),
-        lambda words: None if words == ["None"] else ",".join(words),
-        lambda names: str(names).split(","),
-        "NAME ...",
-        "+",
-    ),
-]
+MaybeNames = Annotated[str | None, _NAMES]
 """Type of an option that takes one name or several, or none."""
 
 

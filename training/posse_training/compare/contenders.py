@@ -13,7 +13,7 @@ import numpy.typing as npt
 from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
-from posse_training.errors import PlayError, TimeLimitError
+from posse_training.errors import PlayError
 from posse_training.evaluation.evaluation import played_errors
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
@@ -71,8 +71,7 @@ def check_code(name: str, limit: float) -> None:
 
     Raises:
         PolicyError: It is no policy.
-        TimeLimitError: It took longer than the limit or :data:`LOADING`, s.
-        PlayError: The process died.
+        PlayError: It took longer than the limit or :data:`LOADING`, s, or the process died.
     """
     apart(min(limit, LOADING), _load, name)
 
@@ -83,7 +82,7 @@ def _load(name: str) -> None:
 
 
 def _checked_code(name: str, limit: float) -> str:
-    with contextlib.suppress(PlayError, TimeLimitError):
+    with contextlib.suppress(PlayError):
         check_code(name, limit)
     return name
 

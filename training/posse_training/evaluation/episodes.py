@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, Family, Scenario
+from posse import Family, Scenario
 from posse.scenarios.family import blocks
 from posse_baselines import Played, Policy, Target, batch_for, load, rollout
-from posse_training.errors import TimeLimitError, TrainedSplitError
+from posse_training.errors import TrainedSplitError
 from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
 
@@ -28,24 +27,6 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
         )
 
 
-def limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
-    """Return a function that calls another one, and raises once a time limit is exceeded."""
-    if time_limit is None:
-        return advance
-    ends = time.monotonic() + time_limit
-
-    def check(steps: int) -> None:
-        if time.monotonic() > ends:
-            raise TimeLimitError(f"it exceeded the time limit of {time_limit:g} s")
-        advance(steps)
-
-    return check
-
-
-def no_report(steps: int) -> None:
-    """Take the number of steps that were played, and do nothing."""
-
-
 class Match(NamedTuple):
     """Who plays against whom, and where."""
 
@@ -58,32 +39,28 @@ class Match(NamedTuple):
 
 
 def play_shard(
-    match: Match, shard: range, *, num_threads: int | None = None, advance: Callable[[int], object] = no_report
+    match: Match, shard: range, *, num_threads: int | None = None, advance: Callable[[], object] | None = None
 ) -> dict[str, Column]:
-    """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
+    """Play one episode in every world of a shard; return every metric by name, (worlds,).
+
+    They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority changed, ``nan`` for
+    policies without leaders. ``advance`` is called after each control step of a batch.
+    """
     policy = load(match.policy) if isinstance(match.policy, str) else match.policy
     where: dict[str, Any] = {"seed": match.seed, "split": match.split}
     played = []
     for one, worlds in blocks(match.scenario, shard, **where):
         place = {**where, "first_world": worlds.start, "num_threads": num_threads}
+        exchanges = ExchangeCounter(len(worlds))
+
+        def note(step: Played, exchanges: ExchangeCounter = exchanges) -> None:
+            exchanges.count(policy.annotations(step.memory).get("leader"), step.running)
+            if advance is not None:
+                advance()
+
         batch = batch_for(policy, one, len(worlds), match.target, **place)
-        played.append(play_episode(batch, policy, advance))
+        played.append(rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total})
     return joined(played)
-
-
-def play_episode(batch: Batch, policy: Policy, advance: Callable[[int], object] = no_report) -> dict[str, Column]:
-    """Play one episode in every world of a batch; return every metric by name, (E,).
-
-    They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
-    changed, ``nan`` for policies without leaders.
-    """
-    exchanges = ExchangeCounter(batch.num_worlds)
-
-    def note(step: Played) -> None:
-        exchanges.count(policy.annotations(step.memory).get("leader"), step.running)
-        advance(1)
-
-    return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
 
 
 def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:

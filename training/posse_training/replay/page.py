@@ -11,7 +11,6 @@ import html
 import json
 import re
 import zlib
-from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
@@ -50,7 +49,6 @@ DARK: Final[dict[str, style.Colour]] = {
 }
 """Colours of the page where the browser prefers a dark scheme; the others are the same."""
 DARK_PLAYERS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), DARK["INK"], (60, 190, 150), (190, 120, 210))
-_SHORT: Final = 24  # letters of a name that a phone shows in one piece
 MODULES: Final = tuple(
     f"{name}.js"
     for name in (
@@ -110,8 +108,7 @@ def page(replay: Replay) -> str:
     names = " and ".join(player.name for player in replay.players)
     values = {
         "title": html.escape(f"{names} on {replay.world['scenario']}"),
-        "verdict": (said := html.escape(verdict(replay))),
-        "sentence": _unbroken(said, [player.name for player in replay.players]),
+        "verdict": html.escape(verdict(replay)),
         "command": html.escape(command(replay)),
         "project": PROJECT,
         "style": _file("style.css"),
@@ -122,14 +119,6 @@ def page(replay: Replay) -> str:
     }
     # In one pass, so that inserted text is not searched again.
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
-
-
-def _unbroken(text: str, names: Sequence[str]) -> str:
-    """Return a text in which short names have hyphens at which no browser breaks them."""
-    for name in map(html.escape, names):
-        if len(name) <= _SHORT:
-            text = text.replace(name, name.replace("-", "\u2011"))
-    return text
 
 
 def _code() -> str:
