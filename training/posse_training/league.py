@@ -51,11 +51,7 @@ _COLUMNS: Final = 4  # of targets, which fit into 80 characters
 
 @dataclass(frozen=True, kw_only=True)
 class LeagueSettings:
-    """Train trackers and targets in turns against the other side's past. The same command again resumes a league.
-
-    Raises:
-        SettingsError: A value out of its range.
-    """
+    """Train trackers and targets in turns against the other side's past. The same command again resumes a league."""
 
     scenario: str = "duel"
     """Scenario of all plays."""
@@ -274,13 +270,7 @@ class League:
 
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
-    """Train the generations that are missing, play all against all, train best responses.
-
-    Raises:
-        PolicyError, ScenarioError: An unknown policy or scenario; nothing is made.
-        RunFolderError: The folder is in use, or has a league of other settings.
-        CheckpointError: A checkpoint cannot be written or read.
-    """
+    """Train the generations that are missing, play all against all, train best responses."""
     found = League(settings, console or Console())
     for team in settings.teams:
         load(team)

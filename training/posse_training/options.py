@@ -91,11 +91,7 @@ MaybeNames = Annotated[str | None, _NAMES]
 
 
 def _address(words: Sequence[str]) -> bool | str:
-    """Return the argument ``ray`` of functions: an address, or ``True`` for the cluster of this machine.
-
-    Raises:
-        ValueError: More than one address.
-    """
+    """Return the argument ``ray`` of functions: an address, or ``True`` for the cluster of this machine."""
     if len(words) > 1:
         raise ValueError(f"one address at most, not {' '.join(words)!r:.100}: put it after the unnamed arguments")
     return words[0] if words else True

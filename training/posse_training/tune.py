@@ -143,14 +143,7 @@ def _scaled(t: Tunable, value: float) -> float:
 
 
 def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
-    """Tune a policy for a scenario, or resume that; return the file of the settings found.
-
-    Raises:
-        PolicyError: An unknown policy, or one without tunable settings.
-        SettingsError: An unknown setting in ``only``, or nothing that has an effect.
-        RunFolderError: The folder is in use, or holds something else.
-        CheckpointError: Its state is damaged.
-    """
+    """Tune a policy for a scenario, or resume that; return the file of the settings found."""
     require("training", "cmaes")
     run, folder = _Run(settings, console or Console()), settings.folder
     with connected(settings.ray), locked(folder):

@@ -12,7 +12,7 @@ from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
 from posse_training.cli import main
-from posse_training.compare.compare import Settings, compare
+from posse_training.compare.compare import Comparison, Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError

@@ -102,14 +102,9 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     Args:
         settings: What to play, and where to write.
         console: Where to show progress; default: the standard error output.
-
-    Raises:
-        SettingsError, PolicyError, ScenarioError: An argument that is unknown or out of its range.
-        TrainedSplitError: A split that a policy was trained on.
-        RunFolderError: The folder is not empty.
     """
     scenarios = _checked(settings)
-    contenders = read_contenders(settings.policies, settings.time_limit)
+    contenders = read_contenders(settings.policies)
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:
         contenders += read_contenders((PLANNER,))
     for policy in (policy for contender in contenders for policy in contender.policies):
@@ -206,7 +201,7 @@ class Comparison:
                 key, limit = (scenario.name, contender.label, k), self.settings.time_limit
                 try:
                     if isinstance(policy, str):
-                        check_code(policy, limit)
+                        check_code(policy)
                     with played_errors():
                         ready[key] = prepare(policy, scenario, self.episodes(contender), time_limit=limit, **self.place)
                 except (PolicyError, PlayError) as error:
