@@ -193,12 +193,7 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
     """Do all jobs at once on a Ray cluster; give the joined arrays of each, or the exception that ended it.
 
     Each finished shard is a file, where the same jobs find it again after an interruption. The files are removed when
-    the context ends without an exception.
-
-    Args:
-        jobs: The jobs.
-        ray: See :func:`connected`.
-        done: Is called after each shard that is done or was found.
+    the context ends without an exception. ``done`` is called after each shard that is done or was found.
     """
     folders = []
     with connected(ray):

@@ -97,11 +97,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     """Evaluate all policies; write rows, summary, figures and report.
 
     A policy that is incompatible with a scenario is omitted there; one that fails is listed under ``failed``. The
-    other policies are not affected.
-
-    Args:
-        settings: What to play, and where to write.
-        console: Where to show progress; default: the standard error output.
+    other policies are not affected. Progress is shown on the console, or else the standard error output.
     """
     scenarios = _checked(settings)
     contenders = read_contenders(settings.policies)
@@ -165,8 +161,6 @@ class Comparison:
     """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
     failed: list[dict[str, str]] = field(default_factory=list)
     """Policies that raised, returned invalid actions, died or exceeded the time limit."""
-    figures: list[Path] = field(default_factory=list)
-    """The files that were drawn."""
     stopped: dict[str, str] = field(default_factory=dict)
     """Why policies that exceeded the time limit are not played again, by label."""
     stems: set[str] = field(default_factory=set)
@@ -292,17 +286,16 @@ class Comparison:
         from posse_training.compare import figures, report  # matplotlib is slow
 
         s = self.settings
-        self.figures = figures.draw(self.folder, self.plays, self.contenders)
         shown = [(one, *self._record(one)) for one in report.extremes(self.plays, self.reference, s.replays)]
         versions = ", ".join(f"{scenario.name} v{scenario.version}" for scenario in self.scenarios)
         text = report.page(
-            f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
-            f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
-            self.reference,
             self.rows,
-            self.figures,
-            shown,
-            {"Left out": self.left_out, "Failed": self.failed},
+            figures.draw(self.folder, self.plays, self.contenders),
+            title=f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
+            facts=f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
+            baseline=self.reference,
+            replays=shown,
+            problems={"Left out": self.left_out, "Failed": self.failed},
         )
         (self.folder / REPORT).write_text(text, encoding="utf-8")
 

@@ -93,11 +93,6 @@ class Evaluation:
     """Of a shard that code plays on a cluster, s."""
 
     @property
-    def job(self) -> Job:
-        """The evaluation for a cluster."""
-        return Job(_play_on_worker, (self.match, self.time_limit), self.shards)
-
-    @property
     def steps(self) -> int:
         """Control steps of all batches."""
         _, _, scenario, seed, split = self.match
@@ -146,7 +141,8 @@ def gathered_results(
     What is finished is kept until the context ends without an exception; see
     :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
     """
-    with gathered([one.job for one in evaluations], ray, done) as found:
+    jobs = [Job(_play_on_worker, (one.match, one.time_limit), one.shards) for one in evaluations]
+    with gathered(jobs, ray, done) as found:
         both = zip(evaluations, found, strict=True)
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
 
