@@ -11,7 +11,7 @@ import pytest
 import posse
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
-from posse_training.errors import ResultFileError
+from posse_training.errors import SettingsError
 from posse_training.leaderboard import CLAIM, Standing, read_standings, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
@@ -70,7 +70,7 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
     ],
 )
 def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(ResultFileError, match=message):
+    with pytest.raises(SettingsError, match=message):
         verify(sent(tmp_path, claim, **changes))
 
 

@@ -41,10 +41,6 @@ class TimeLimitError(PlayError):
     """A policy that exceeded the time limit."""
 
 
-class ResultFileError(UserError, ValueError):
-    """A claim for the leaderboard that is invalid or cannot be checked."""
-
-
 class ClusterError(UserError, RuntimeError):
     """Work on a cluster that cannot begin or go on; the message says why and what to do."""
 

@@ -17,8 +17,6 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["check_held", "check_new", "hold_settings", "locked", "read_json"]
-
 _LOCK: Final = "lock"
 
 

@@ -22,7 +22,7 @@ from posse import get_scenario, scenario_names
 from posse_baselines import Policy, load, policy_names
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import FILES, is_code
-from posse_training.errors import ResultFileError
+from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.files import check_new
 from posse_training.provenance import commit
@@ -43,7 +43,7 @@ class Standing:
     """What a policy scores on a scenario: mean safe score with its 95 % interval, score, share without contact.
 
     Raises:
-        ResultFileError: A text that a page could not show as it is.
+        SettingsError: A text that a page could not show as it is.
     """
 
     label: str
@@ -83,10 +83,10 @@ class Verdict:
 
 
 def check_texts(**texts: str) -> None:
-    """Raise a ``ResultFileError`` for a text that a table cannot hold."""
+    """Raise a ``SettingsError`` for a text that a table cannot hold."""
     for name, text in texts.items():
         if not _TEXT.fullmatch(text):
-            raise ResultFileError(f"{name}={text!r:.80} must be at most 100 letters, digits and '._:+ -'")
+            raise SettingsError(f"{name}={text!r:.80} must be at most 100 letters, digits and '._:+ -'")
 
 
 def measure(label: str, text: str, policy: Policy, scenario: str, worlds: int, seed: int) -> Standing:
@@ -124,7 +124,7 @@ def read_standings(path: str | Path) -> list[Standing]:
     """Read and check a table; it loads no policy.
 
     Raises:
-        ResultFileError: The file or a column is missing, or a value is invalid; its line is named.
+        SettingsError: The file or a column is missing, or a value is invalid; its line is named.
     """
     rows: list[Standing] = []
     try:
@@ -132,7 +132,7 @@ def read_standings(path: str | Path) -> list[Standing]:
             values = {field.name: _KINDS[field.type](row[field.name]) for field in fields(Standing)}
             rows.append(Standing(**values))
     except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
-        raise ResultFileError(f"{path}, line {len(rows) + 2}: {error}") from error
+        raise SettingsError(f"{path}, line {len(rows) + 2}: {error}") from error
     return rows
 
 
@@ -155,7 +155,7 @@ def submit(
         seed: Seed of the worlds.
 
     Raises:
-        ResultFileError: An invalid name; nothing is played.
+        SettingsError: An invalid name; nothing is played.
         RunFolderError: A folder that is not empty; nothing is played.
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
@@ -189,18 +189,18 @@ def verify(
         seed: Seed of the fresh worlds; default: drawn now, so that no submission can know them.
 
     Raises:
-        ResultFileError: An invalid claim, code without ``run_code``, or another version of the scenario.
+        SettingsError: An invalid claim, code without ``run_code``, or another version of the scenario.
     """
     rows = read_standings(path := folder / CLAIM)
     if len(rows) != 1:
-        raise ResultFileError(f"{path} must have one row, it has {len(rows)}")
+        raise SettingsError(f"{path} must have one row, it has {len(rows)}")
     claim, text = rows[0], rows[0].policy
     if claim.scenario not in scenario_names() or get_scenario(claim.scenario).version != claim.version:
-        raise ResultFileError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
+        raise SettingsError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
     if is_code(text) and not run_code:
-        raise ResultFileError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
+        raise SettingsError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
     if not is_code(text) and text not in policy_names() and Path(text).suffix not in FILES:
-        raise ResultFileError(f"{path}: policy={text!r} is neither shipped nor a policy file beside it, nor code")
+        raise SettingsError(f"{path}: policy={text!r} is neither shipped nor a policy file beside it, nor code")
     policy = load(str(folder / text) if Path(text).suffix in FILES else text)
     drawn = secrets.randbelow(2**31) if seed is None else seed
     return Verdict(claim, measure(claim.label, text, policy, claim.scenario, episodes, drawn))

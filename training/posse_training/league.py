@@ -20,13 +20,13 @@ from rich.table import Table
 from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.fields import number
-from posse_baselines.files import replacing, write_atomically
+from posse_baselines.files import read_json, replacing, write_atomically
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import hold_settings, locked, read_json
+from posse_training.files import hold_settings, locked
 from posse_training.options import Changes, Pairs
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings

@@ -26,13 +26,13 @@ from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, Tunable, load
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, tunables
-from posse_baselines.files import write_atomically
+from posse_baselines.files import read_json, write_atomically
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import CheckpointError, SettingsError, check_settings, require
 from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
-from posse_training.files import hold_settings, locked, read_json
+from posse_training.files import hold_settings, locked
 from posse_training.options import Ray
 from posse_training.parallel import connected, on_ray
 from posse_training.provenance import commit

@@ -16,8 +16,7 @@ import posse
 from posse.rendering.style import GROUND, PAPER, TARGET
 from posse_baselines import Recorder
 from posse_training.replay import RECORD, read_replay, record, replay_of, write_replay
-from posse_training.replay.page import DARK
-from posse_training.replay.words import command, verdict
+from posse_training.replay.page import DARK, command, verdict
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -17,9 +17,8 @@ from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
 from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
-from posse_training.replay.columns import columns_of
+from posse_training.replay.columns import columns_of, find_events
 from posse_training.replay.episode import Player, Replay, join
-from posse_training.replay.events import find_events
 
 RECORD: Final = ("state", "observations", "actions", "terms", "annotations")
 """Names of the arrays of a trajectory that a replay is made of."""
