@@ -36,6 +36,7 @@ class Trajectory:
     tracker_pose           (T + 1, E, N, 3)             x, y in m, heading in rad
     target_pose            (T + 1, E, 3)
     any of ``batch.state`` (T + 1, E, ...)              ``tracker_speed``, ``heard_step``, ``world_score``, ...
+    state                  (T + 1, E, ...) each         all of ``batch.state``, each by its own name
     actions                (T, E, rows, 2 + m)
     rewards                (T, E, rows)
     terms                  (T, E, rows) each            terms of the reward, as ``reward/NAME``
@@ -104,8 +105,9 @@ class Recorder:
 
     def __init__(self, batch: Batch, record: Iterable[str] = ()) -> None:
         self.batch = batch
-        self._names = tuple(dict.fromkeys(record))
-        known = (*_FRAMES, *_STEPS, *batch.state)
+        asked = [each for name in record for each in (batch.state if name == "state" else [name])]
+        self._names = tuple(dict.fromkeys(asked))
+        known = (*_FRAMES, *_STEPS, "state", *batch.state)
         for name in self._names:
             if name not in known:
                 raise ValueError(f"record={name!r} is unknown; names are: {', '.join(known)}")

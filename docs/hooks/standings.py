@@ -13,7 +13,7 @@ from mkdocs.exceptions import PluginError
 import posse
 from declared_tables import code, table
 from posse_baselines import load, policy_names
-from posse_training.errors import ResultFileError
+from posse_training.errors import SettingsError
 from posse_training.leaderboard import WORLDS, Standing, read_standings
 
 RESULTS: Final = Path(__file__).parents[2] / "benchmarks"
@@ -28,7 +28,7 @@ def standings(path: Path) -> tuple[Standing, ...]:
     """Return the rows of test worlds of the present scenarios, the best first."""
     try:
         rows = read_standings(path)
-    except ResultFileError as error:
+    except SettingsError as error:
         raise PluginError(str(error)) from error
     versions = {name: posse.get_scenario(name).version for name in SCENARIOS}
     known = [row for row in rows if row.split == "test" and versions.get(row.scenario) == row.version]

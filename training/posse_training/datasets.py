@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from minari import MinariDataset
     from minari.data_collector import EpisodeBuffer
 
-__all__ = ["load_dataset", "record_dataset"]
+__all__ = ["record_dataset"]
 
 _RECORD: Final = ("observations", "actions", "rewards", "terms", "score", "terminated", "truncated")
 Metadata = dict[str, Any]
@@ -42,7 +42,7 @@ def record_dataset(
     name: str | None = None,
     seed: int = 7,
     split: str = "train",
-    progress: Callable[[int], object] = lambda episodes: None,
+    progress: bool = True,
     **overrides: Any,
 ) -> MinariDataset:
     """Record episodes of ``posse/Team-v0`` as a Minari data set, ``posse/SCENARIO/NAME-v0``.
@@ -60,7 +60,7 @@ def record_dataset(
         name: Name of the data set; default: the policies', joined by ``-and-``.
         seed: Seed of the worlds.
         split: Split of the worlds.
-        progress: Called after each episode with 1, the number of episodes that were written.
+        progress: Whether to show a bar.
         overrides: Settings of the scenario.
 
     Raises:
@@ -107,34 +107,20 @@ def record_dataset(
         "posse": json.dumps(about),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial:
+    with (
+        tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial,
+        progress_bar(disable=not progress) as bar,
+    ):
         (data := Path(partial, "new", "data")).mkdir(parents=True)
         storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
         storage.update_metadata(described)
-        for world in range(episodes):
+        for world in bar.track(range(episodes), description="episodes"):
             buffer, metadata = _episode(players[world % len(players)], settings, world, seed, split)
             storage.update_episodes([buffer])
             storage.update_episode_metadata([metadata], [world])
-            progress(1)
         (folder / called).parent.mkdir(parents=True, exist_ok=True)
         data.parent.rename(folder / called)
-    return load_dataset(folder, called)
-
-
-def load_dataset(out: str | Path, name: str) -> MinariDataset:
-    """Return a data set of a folder by its name, ``posse/SCENARIO/NAME-v0``.
-
-    Raises:
-        MissingExtraError: Minari is not installed.
-        FileNotFoundError: There is none of this name.
-    """
-    require("datasets", "minari", "h5py")
-    from minari import MinariDataset
-
-    path = Path(out, name, "data").resolve()
-    if not path.is_dir():
-        raise FileNotFoundError(f"{path} does not exist: there is no data set of this name")
-    return MinariDataset(path)
+    return minari.MinariDataset(folder / called / "data")
 
 
 def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: str) -> tuple[EpisodeBuffer, Metadata]:
@@ -191,11 +177,9 @@ class _Record:
 def main(arguments: Sequence[str]) -> None:
     """Record, and print where the data set is and how it is loaded."""
     which = tyro.cli(_Record, prog="posse record", args=arguments)
-    with progress_bar() as bar:
-        task = bar.add_task("episodes", total=which.episodes)
-        values = asdict(which)
-        values |= values.pop("overrides")
-        dataset = record_dataset(**values, progress=lambda count: bar.advance(task, count))
+    values = asdict(which)
+    values |= values.pop("overrides")
+    dataset = record_dataset(**values)
     print(
         f"{dataset.total_episodes} episodes, {dataset.total_steps:,} steps: "
         f"MINARI_DATASETS_PATH={which.out} and minari.load_dataset({dataset.spec.dataset_id!r})"

@@ -33,16 +33,12 @@ class TrainedSplitError(UserError, ValueError):
     """An evaluation on worlds that the policy was trained on."""
 
 
-class TimeLimitError(UserError, RuntimeError):
-    """An evaluation that exceeded its time limit."""
-
-
 class PlayError(UserError, RuntimeError):
     """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
 
 
-class ResultFileError(UserError, ValueError):
-    """A claim for the leaderboard that is invalid or cannot be checked."""
+class TimeLimitError(PlayError):
+    """A policy that exceeded the time limit."""
 
 
 class ClusterError(UserError, RuntimeError):

@@ -17,8 +17,6 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["check_held", "check_new", "hold_settings", "locked", "read_json"]
-
 _LOCK: Final = "lock"
 
 
@@ -51,21 +49,13 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def check_new(out: Path) -> None:
-    """Raise if a folder is neither new nor empty.
-
-    Raises:
-        RunFolderError: It is something else.
-    """
+    """Raise if a folder is neither new nor empty."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
 
 
 def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
-    """Raise if a file holds other settings of a run, but for those that are ``free``.
-
-    Raises:
-        RunFolderError: They differ, or cannot be read.
-    """
+    """Raise if a file holds other settings of a run, but for those that are ``free``."""
     if not path.is_file():
         return
     wanted = json.loads(json.dumps(settings))

@@ -32,11 +32,7 @@ _FLAT: Final = [c for c in vars(style).values() if isinstance(c, tuple)] + [*TAS
 
 
 class Team:
-    """A policy as it plays one world against a target, or the scenario's own.
-
-    Raises:
-        PolicyError: The policy does not fit the scenario.
-    """
+    """A policy as it plays one world against a target, or the scenario's own."""
 
     def __init__(
         self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str, target: Target | None = None

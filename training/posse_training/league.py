@@ -20,13 +20,13 @@ from rich.table import Table
 from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.fields import number
-from posse_baselines.files import replacing, write_atomically
+from posse_baselines.files import read_json, replacing, write_atomically
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import hold_settings, locked, read_json
+from posse_training.files import hold_settings, locked
 from posse_training.options import Changes, Pairs
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings
@@ -51,11 +51,7 @@ _COLUMNS: Final = 4  # of targets, which fit into 80 characters
 
 @dataclass(frozen=True, kw_only=True)
 class LeagueSettings:
-    """Train trackers and targets in turns against the other side's past. The same command again resumes a league.
-
-    Raises:
-        SettingsError: A value out of its range.
-    """
+    """Train trackers and targets in turns against the other side's past. The same command again resumes a league."""
 
     scenario: str = "duel"
     """Scenario of all plays."""
@@ -274,13 +270,7 @@ class League:
 
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
-    """Train the generations that are missing, play all against all, train best responses.
-
-    Raises:
-        PolicyError, ScenarioError: An unknown policy or scenario; nothing is made.
-        RunFolderError: The folder is in use, or has a league of other settings.
-        CheckpointError: A checkpoint cannot be written or read.
-    """
+    """Train the generations that are missing, play all against all, train best responses."""
     found = League(settings, console or Console())
     for team in settings.teams:
         load(team)
@@ -328,15 +318,13 @@ def write_results(found: League) -> None:
 def draw_matrix(found: League) -> list[Path]:
     """Write the matrix of scores as PNG and SVG to the league's folder; return the files."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
-    from posse_training.style import RC, WIDTH, note, plain, save
+    from posse_training.style import RC, WIDTH, note, plain, save, subplots
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
     scores = [[found.at(a, b).score for b in targets] for a in teams]
     with mpl.rc_context({**RC, "axes.grid": False}):
-        figure = Figure(figsize=(WIDTH, 1.4 + 0.42 * len(teams)), layout="constrained")
-        axis = figure.subplots()
+        figure, axis = subplots(1, 1, (WIDTH, 1.4 + 0.42 * len(teams)))
         image = axis.imshow([[v.value for v in row] for row in scores], vmin=0, vmax=1, cmap="cividis", aspect="auto")
         axis.set_xticks(range(len(targets)), targets, rotation=35, ha="right")
         axis.set_yticks(range(len(teams)), teams)

@@ -77,27 +77,21 @@ Pairs = Annotated[dict[str, Any], _words(dict, settings_of, words_of, "KEY=VALUE
 """Type of an option that takes ``KEY=VALUE ...``."""
 Changes = Annotated[Pairs, tyro.conf.arg(name="set")]
 """Type of the option ``--set``."""
-Names = Annotated[str, _words(str, ",".join, lambda names: names.split(","), "NAME ...", "+")]
+_NAMES: Final = _words(
+    (str, type(None)),
+    lambda words: None if words == ["None"] else ",".join(words),
+    lambda names: str(names).split(","),
+    "NAME ...",
+    "+",
+)
+Names = Annotated[str, _NAMES]
 """Type of an option that takes one name or several; in Python a text with commas between."""
-MaybeNames = Annotated[
-    str | None,
-    _words(
-        (str, type(None)),
-        lambda words: None if words == ["None"] else ",".join(words),
-        lambda names: str(names).split(","),
-        "NAME ...",
-        "+",
-    ),
-]
+MaybeNames = Annotated[str | None, _NAMES]
 """Type of an option that takes one name or several, or none."""
 
 
 def _address(words: Sequence[str]) -> bool | str:
-    """Return the argument ``ray`` of functions: an address, or ``True`` for the cluster of this machine.
-
-    Raises:
-        ValueError: More than one address.
-    """
+    """Return the argument ``ray`` of functions: an address, or ``True`` for the cluster of this machine."""
     if len(words) > 1:
         raise ValueError(f"one address at most, not {' '.join(words)!r:.100}: put it after the unnamed arguments")
     return words[0] if words else True

@@ -18,7 +18,7 @@ import shutil
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -40,7 +40,6 @@ RETRIES: Final = 3
 """How often Ray does a call again whose worker died."""
 _GRACE: Final = 3.0  # s beyond a time limit, in which a policy may notice it by itself
 _PATIENCE: Final = 10.0  # s until an address that does not answer is an error
-_LOOK: Final = 1.0  # s between two looks at which calls are finished
 
 
 def cut(count: int, size: int) -> list[range]:
@@ -133,13 +132,10 @@ def connected(ray: bool | str, *, log: bool = False) -> Iterator[None]:
         cluster.shutdown()
 
 
-def on_ray(
-    function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], dropped: Collection[int] = ()
-) -> Iterator[tuple[int, Any]]:
+def on_ray(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
     """Yield the index and the result of each call as it finishes, on one core each of the connected cluster.
 
-    A result is an exception if the function raised one, or if the workers of a call died again and again. Calls whose
-    index the caller adds to ``dropped`` meanwhile are cancelled.
+    A result is an exception if the function raised one, or if the workers of a call died again and again.
     """
     import ray
 
@@ -147,7 +143,7 @@ def on_ray(
     running = {task.remote(function, installed(), *call): k for k, call in enumerate(calls)}
     try:
         while running:
-            ready, _ = ray.wait(list(running), num_returns=len(running), timeout=_LOOK)
+            ready, _ = ray.wait(list(running))
             for k, reference in [(running.pop(reference), reference) for reference in ready]:
                 try:
                     yield k, ray.get(reference)
@@ -156,9 +152,6 @@ def on_ray(
                 except ray.exceptions.RayError as error:
                     why = f"{type(error).__name__}: {' '.join(str(error).split()):.200}"
                     yield k, PlayError(f"{RETRIES + 1} workers died with it; the last one: {why}")
-            for reference in [reference for reference, k in running.items() if k in dropped]:
-                del running[reference]
-                ray.cancel(reference, force=True)
     finally:
         for reference in running:
             ray.cancel(reference, force=True)
@@ -200,16 +193,7 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
     """Do all jobs at once on a Ray cluster; give the joined arrays of each, or the exception that ended it.
 
     Each finished shard is a file, where the same jobs find it again after an interruption. The files are removed when
-    the context ends without an exception.
-
-    Args:
-        jobs: The jobs.
-        ray: See :func:`connected`.
-        done: Is called after each shard that is done or was found.
-
-    Raises:
-        MissingExtraError: Ray is not installed.
-        ClusterError: There is no such cluster.
+    the context ends without an exception. ``done`` is called after each shard that is done or was found.
     """
     folders = []
     with connected(ray):
@@ -225,14 +209,12 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
         calls = [(k, shard) for k, job in enumerate(jobs) for shard in job.shards if shard not in parts[k]]
         sent = [cluster.put((job.function, job.arguments)) for job in jobs]  # to each node once, not with each shard
         failed: dict[int, Exception] = {}
-        dropped: set[int] = set()
-        for call, result in on_ray(_play, [(sent[k], shard) for k, shard in calls], dropped):
+        for call, result in on_ray(_play, [(sent[k], shard) for k, shard in calls]):
             k, shard = calls[call]
             if isinstance(result, ClusterError):
                 raise result
             if isinstance(result, Exception):
                 failed.setdefault(k, result)
-                dropped |= {other for other, (job_of, _) in enumerate(calls) if job_of == k}
             elif k not in failed:
                 parts[k][shard] = result
                 content = io.BytesIO()

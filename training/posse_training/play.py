@@ -17,7 +17,7 @@ from posse.rendering.style import TRACKER
 from posse_baselines import Policy, PolicyError, Recorder, begin, load
 from posse_training.errors import SettingsError
 from posse_training.options import OneWorld
-from posse_training.replay import RECORD, Replay, join, replay_of, write_replay
+from posse_training.replay import RECORD, Replay, replay_of, write_replay
 
 _SIZES: Final = (200, 4096)  # px, least and most
 _ARROWS: Final = ("left", "right", "up", "down")
@@ -40,7 +40,7 @@ class _Play(OneWorld):
     size: tuple[int, int] = (960, 720)
     """Width and height of the window, px."""
     out: Path = Path("play.html")
-    """Replay page of the best and the last round, written at the end."""
+    """Replay page of the last round, written at the end."""
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -60,11 +60,7 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, str]) -> tuple[Renderer, Window]:
-    """Open a window; ``keys`` are those beside its own, with what they do.
-
-    Raises:
-        SettingsError: A size out of range, or no display.
-    """
+    """Open a window; ``keys`` are those beside its own, with what they do."""
     least, most = _SIZES
     if not all(least <= side <= most for side in size):
         raise SettingsError(f"--size {size[0]} {size[1]} must be {least} to {most} px each")
@@ -80,11 +76,7 @@ def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, st
 
 
 def robot_of(name: str, num_trackers: int) -> int:
-    """Return the number of the robot with a name: ``"target"``, or ``"tracker_2"``.
-
-    Raises:
-        SettingsError: There is no such robot.
-    """
+    """Return the number of the robot with a name: ``"target"``, or ``"tracker_2"``."""
     names = [*(f"tracker_{k}" for k in range(num_trackers)), "target"]
     if name not in names:
         raise SettingsError(f"--as {name} is no robot; there are: {', '.join(names)}")
@@ -109,12 +101,7 @@ def play(
     the target.
 
     Returns:
-        The points of the rounds played to the end, and a replay of the best of them and the last round, beside each
-        other if of one world; ``None``: nothing was played.
-
-    Raises:
-        PolicyError: The policy does not fit the scenario, or cannot play against a person.
-        SettingsError: Nobody drives the target, or no display is available.
+        The points of the rounds played to the end, and a replay of the last round; ``None``: nothing was played.
     """
     n = scenario.num_trackers
     scenario = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
@@ -131,7 +118,6 @@ def play(
     Batch(scenario, 1, seed=seed, split=split, first_world=world).reset()  # finds mistakes before the window opens
     renderer, window = open_window(scenario, size, {"n": "next world"})
     rounds: list[float] = []
-    best: Replay | None = None
     last: Replay | None = None
     window.paused = True
     try:
@@ -143,17 +129,13 @@ def play(
             if scores:
                 last = replay_of(recorder.trajectory(), f"{policy.name}, {who}")
             if recorder.over.all():
-                points = _points(scores, robot == n)
-                best = last if points > max(rounds, default=-1.0) else best
-                rounds.append(points)
+                rounds.append(_points(scores, robot == n))
             if "n" in window.pressed:
                 world += 1
                 window.paused = True
     finally:
         renderer.close()
-    if best is None or last is None or best is last:
-        return rounds, best or last
-    return rounds, join([best, last]) if best.world["world"] == last.world["world"] else best
+    return rounds, last
 
 
 def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Renderer, window: Window) -> list[float]:

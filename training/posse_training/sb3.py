@@ -76,11 +76,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         self._whole_team = len(shape) == 2
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
-        """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states.
-
-        Raises:
-            PolicyError: Observations are of another length than those that the model learned on.
-        """
+        """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states."""
         check_fits(self, layout)
         encoder = None if self._encoding is None else Encoder(self._encoding, layout)
         size = layout.size if self._encoding is None else self._encoding.size

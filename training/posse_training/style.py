@@ -77,6 +77,12 @@ def looks_of(policies: Iterable[str]) -> Looks:
     return {**looks, BOUND: Style(INK, "", (0, (1, 1.5)))}
 
 
+def subplots(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    """Return a figure of a size in inches, and its axes."""
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG to a folder; return the files."""
     files = [folder / f"{name}.png", folder / f"{name}.svg"]

@@ -151,7 +151,7 @@ class PosseEnv(EnvBase):
         if marks is None or bool(marks.all()):
             self._seed = None
         else:
-            mask = self._array(marks.reshape(self.batch.num_worlds))
+            mask = marks.reshape(self.batch.num_worlds).cpu().numpy()
             seed, options = kwargs.get("seed"), {**(options or {}), "reset_mask": mask}
         observations = self.batch.reset(seed=seed, options=options)
         if self._guard is not None:
@@ -170,7 +170,7 @@ class PosseEnv(EnvBase):
         together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
         if self._motions is not None:
             together = self._motions[together]
-        actions_of_all = self._array(together.detach())
+        actions_of_all = together.detach().cpu().numpy()
         if self._guard is not None:
             motions = self._guard.actions(actions_of_all[:, self._rows[TRACKERS]])
             actions_of_all = np.concatenate([motions, actions_of_all[:, motions.shape[1] :]], axis=1)
@@ -203,7 +203,3 @@ class PosseEnv(EnvBase):
     def _tensor(self, array: Any) -> torch.Tensor:
         """Return an array of the engine as a tensor on the device."""
         return torch.from_numpy(array).to(self.device)
-
-    def _array(self, tensor: torch.Tensor) -> Any:
-        """Return a tensor in the form that the engine takes."""
-        return tensor.cpu().numpy()

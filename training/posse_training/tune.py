@@ -26,13 +26,13 @@ from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, Tunable, load
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, tunables
-from posse_baselines.files import write_atomically
+from posse_baselines.files import read_json, write_atomically
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import CheckpointError, SettingsError, check_settings, require
 from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
-from posse_training.files import hold_settings, locked, read_json
+from posse_training.files import hold_settings, locked
 from posse_training.options import Ray
 from posse_training.parallel import connected, on_ray
 from posse_training.provenance import commit
@@ -143,14 +143,7 @@ def _scaled(t: Tunable, value: float) -> float:
 
 
 def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
-    """Tune a policy for a scenario, or resume that; return the file of the settings found.
-
-    Raises:
-        PolicyError: An unknown policy, or one without tunable settings.
-        SettingsError: An unknown setting in ``only``, or nothing that has an effect.
-        RunFolderError: The folder is in use, or holds something else.
-        CheckpointError: Its state is damaged.
-    """
+    """Tune a policy for a scenario, or resume that; return the file of the settings found."""
     require("training", "cmaes")
     run, folder = _Run(settings, console or Console()), settings.folder
     with connected(settings.ray), locked(folder):

@@ -12,7 +12,7 @@ from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
 from posse_training.cli import main
-from posse_training.compare.compare import Settings, compare
+from posse_training.compare.compare import Comparison, Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError
@@ -152,7 +152,7 @@ def test_a_folder_with_any_file_is_refused_before_anything_is_played(
     def played(*arguments: object, **settings: object) -> None:
         raise AssertionError("it was played")
 
-    monkeypatch.setattr("posse_training.compare.compare.play", played)
+    monkeypatch.setattr(Comparison, "play", played)
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(RunFolderError, match="not an empty folder"):
         compare(Settings(("idle",), ("constant",), out=tmp_path))

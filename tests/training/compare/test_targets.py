@@ -12,14 +12,11 @@ import pytest
 from tests.support.learned import target_for
 
 import posse
-from posse_baselines import PolicyError, load
+from posse_baselines import PolicyError
 from posse_training import evaluate
 from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, Settings, compare
 from posse_training.compare.compare import main as compare_main
-from posse_training.compare.contenders import Contender
-from posse_training.compare.playing import Game
-from posse_training.compare.playing import replay as play_again
 from posse_training.replay import record
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -69,9 +66,6 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     replay = record(["pursuit"], SHORT, target=str(file), seconds=2.0)
     actions = replay.players[0].columns["action"].values
     assert actions.shape[1] == SHORT.num_trackers + 1, "the target's action as well"
-    # As a comparison's report does.
-    shown = play_again(Contender("p", (load("pursuit"),)), 0, SHORT, 0, Game(7, "test", str(file), 60.0))
-    assert shown.players[0].columns["action"].values.shape[1] == SHORT.num_trackers + 1
     film = tmp_path / "film.gif"
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--set", "num_trackers=3"]
     watch.main([*asked, "--out", str(film), "--seconds", "0.3"])

@@ -14,7 +14,6 @@ from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 from posse_training import evaluate
 from posse_training.evaluation import statistics
-from posse_training.evaluation.episodes import ExchangeCounter
 from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
@@ -77,14 +76,6 @@ def test_rows_and_settings_are_written_as_files(tmp_path: Path) -> None:
     settings = json.loads((tmp_path / "deep" / "idle.json").read_text())
     assert settings["scenario"]["radio_loss"] == posse.get_scenario("radio").radio_loss
     assert (settings["seed"], settings["split"]) == (9, "test")
-
-
-def test_leader_exchanges_are_counted_where_most_agree() -> None:
-    counter = ExchangeCounter(2)
-    running = np.array([True, True])
-    for leaders in ([[0, 0, 0], [1, 1, 2]], [[0, 1, 2], [1, 1, 1]], [[2, 2, 0], [1, 1, 1]]):
-        counter.count(np.array(leaders), running)
-    assert list(counter.total) == [1, 0]
 
 
 @pytest.mark.parametrize("reads", [False, True])

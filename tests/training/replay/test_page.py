@@ -15,8 +15,7 @@ from tests.support.replays import ATTACK, hostile, short
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
-from posse_training.replay.page import page
-from posse_training.replay.words import verdict
+from posse_training.replay.page import page, verdict
 
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])

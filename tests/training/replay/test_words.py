@@ -11,7 +11,7 @@ from tests.support.replays import hostile, short
 
 from posse_training.cli import main
 from posse_training.replay import Column, Event, Player, Replay, read_replay, record, write_replay
-from posse_training.replay.words import command, verdict
+from posse_training.replay.page import command, verdict
 
 WAY = [0.0] * 10
 FULL = [1.0] * 40
@@ -28,23 +28,25 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
     [
         (
             player("b", [*WAY, *FULL[:20], *[0.5] * 10, *FULL[:10]], (31, "dart")),
-            "70 %; the difference arose in one dart.",
+            "70 %; most of the difference arose in 1 dart.",
         ),
-        (player("b", [*WAY, *FULL[:20], *[0.0] * 20], (31, "break")), "40 %; the difference arose after one break."),
-        (player("b", [*WAY, *WAY, *FULL[:30]], (5, "dart")), "60 %; the difference arose on the way to the slots."),
+        (
+            player("b", [*WAY, *FULL[:20], *[0.0] * 20], (31, "break")),
+            "40 %; most of the difference arose after 1 break.",
+        ),
+        (
+            player("b", [*WAY, *WAY, *FULL[:30]], (5, "dart")),
+            "60 %; most of the difference arose on the way to the slots.",
+        ),
         (player("b", [*WAY, *[0.9] * 40]), "72 %."),  # nowhere in particular
         (player("b", [*WAY, *FULL], (11, "dart")), "80 %."),
         (
             player("b", [*WAY, *WAY[:5], *FULL[:5], *WAY, *FULL[:20]], (21, "dart")),
-            "50 %; most of the difference arose in one dart.",
+            "50 %; most of the difference arose in 1 dart.",
         ),
         (
             player("b", [*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], (21, "dart"), (36, "dart")),
-            "40 %; the difference arose in two darts.",
-        ),
-        (
-            player("b", [*WAY, *WAY, *FULL[:5], *WAY, *FULL[:15]], (26, "break")),
-            "40 %; the difference arose on the way to the slots and after one break.",
+            "40 %; most of the difference arose in 2 darts.",
         ),
         (player("b", [*WAY, *FULL], (15, "contact")), "80 % (none counts from its contact at 1.5 s on)."),
     ],

@@ -84,11 +84,6 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
 
     On a Ray cluster each run is one task, which writes to its run folder on a file system that all nodes share: a run
     whose worker died is resumed from its checkpoint by another one.
-
-    Raises:
-        RunFolderError: A folder holds a run with other settings.
-        ClusterError: There is no such cluster, or a node does not share the file system.
-        Exception: As :func:`posse_training.train.train.train`; on a cluster when all runs have ended.
     """
     from posse_training.train.train import check_before, train  # torch
 
@@ -107,11 +102,7 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
 
 
 def train_on_worker(settings: TrainSettings, where: Path) -> Path:
-    """Train on a worker as in the folder ``where``, on one thread; return the best policy's file.
-
-    Raises:
-        ClusterError: The node has no such folder.
-    """
+    """Train on a worker as in the folder ``where``, on one thread; return the best policy's file."""
     from posse_training.train.train import train  # torch
 
     if not where.is_dir():

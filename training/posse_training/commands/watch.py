@@ -85,12 +85,7 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int], world: int, **worlds: Any) -> None:
-    """Play one policy at a time in a window, until the user closes it; each ended episode prints its score.
-
-    Raises:
-        SettingsError: No display is available.
-        PolicyError: A policy that does not fit the scenario.
-    """
+    """Play one policy at a time in a window, until the user closes it; each ended episode prints its score."""
     from posse_training.film import Team
     from posse_training.play import open_window
 

@@ -1,4 +1,8 @@
-"""``posse compare``: policies on the same worlds, with intervals and paired differences."""
+"""``posse compare``: policies on the same worlds, with intervals and paired differences.
+
+Policies of the package and policy files play in this process. One that is code, ``package.module:Class``, plays in a
+process of its own, which is ended at the time limit. That is no sandbox.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import contextlib
 import itertools
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -17,24 +21,34 @@ from rich.console import Console
 import posse
 from posse import Batch, Family, Scenario, scenario_names
 from posse.scenarios.family import blocks, scenario_or_family
-from posse_baselines import PolicyError, load_target
+from posse_baselines import Policy, PolicyError, load_target
 from posse_baselines.fields import number
-from posse_training.compare.contenders import Contender, Plays, read_contenders
-from posse_training.compare.playing import Game, Key, Played, play, played_on_ray, replay
+from posse_training.compare.contenders import Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
-from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.evaluation import (
+    Evaluation,
+    evaluate,
+    gathered_results,
+    played_errors,
+    prepare,
+    progress_bar,
+)
+from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import check_new
 from posse_training.options import Changes, Ray, words_of
+from posse_training.parallel import apart
 from posse_training.provenance import commit
-from posse_training.replay import join, write_replay
+from posse_training.replay import Replay, join, record, write_replay
 
 PLANNER: Final = "planner"
 """The reference that is shown with every team."""
 SUMMARY: Final = "summary.json"
 REPORT: Final = "report.html"
+Key = tuple[str, str, int]
+"""Scenario, label of a contender, and which of its policies."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +81,8 @@ class Settings:
     """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
     and rliable read."""
     time_limit: float = number(1800.0, "s", 0.001, 10.0**9)
-    """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
-    500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
+    """Time limit of a policy that is code, on one scenario, for each training seed, s (with --ray: of a shard of
+    500 worlds); one that exceeds it is stopped and skipped on the remaining scenarios."""
     ray: Ray = False
     """Play all at once on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
     this machine, or else all its cores. The same command resumes an interrupted comparison. Extra: cluster."""
@@ -83,19 +97,10 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     """Evaluate all policies; write rows, summary, figures and report.
 
     A policy that is incompatible with a scenario is omitted there; one that fails is listed under ``failed``. The
-    other policies are not affected.
-
-    Args:
-        settings: What to play, and where to write.
-        console: Where to show progress; default: the standard error output.
-
-    Raises:
-        SettingsError, PolicyError, ScenarioError: An argument that is unknown or out of its range.
-        TrainedSplitError: A split that a policy was trained on.
-        RunFolderError: The folder is not empty.
+    other policies are not affected. Progress is shown on the console, or else the standard error output.
     """
     scenarios = _checked(settings)
-    contenders = read_contenders(settings.policies, settings.time_limit)
+    contenders = read_contenders(settings.policies)
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:
         contenders += read_contenders((PLANNER,))
     for policy in (policy for contender in contenders for policy in contender.policies):
@@ -110,9 +115,8 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
         if settings.ray is not False:
-            played = [(c, scenario, found.episodes(c)) for scenario in scenarios for c in contenders]
             report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
-            found.played = stack.enter_context(played_on_ray(played, found.game, settings.ray, report))
+            stack.enter_context(found.played_on_ray(settings.ray, report))
             bar.reset(task, total=len(scenarios) * len(contenders))
         folder.mkdir(parents=True, exist_ok=True)
         for scenario in scenarios:
@@ -157,12 +161,10 @@ class Comparison:
     """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
     failed: list[dict[str, str]] = field(default_factory=list)
     """Policies that raised, returned invalid actions, died or exceeded the time limit."""
-    figures: list[Path] = field(default_factory=list)
-    """The files that were drawn."""
     stopped: dict[str, str] = field(default_factory=dict)
     """Why policies that exceeded the time limit are not played again, by label."""
     stems: set[str] = field(default_factory=set)
-    played: dict[Key, Played] = field(default_factory=dict)
+    played: dict[Key, Results | Exception] = field(default_factory=dict)
     """What a cluster has played already."""
 
     @property
@@ -171,16 +173,37 @@ class Comparison:
         return self.contenders[0].label
 
     @property
-    def game(self) -> Game:
-        """What is played."""
-        s = self.settings
-        return Game(s.seed, s.split, s.target, s.time_limit)
+    def place(self) -> dict[str, Any]:
+        """Seed and split of the worlds, and the target."""
+        return {name: getattr(self.settings, name) for name in ("seed", "split", "target")}
 
     def episodes(self, contender: Contender) -> int:
         """Number of worlds that a contender plays."""
         s = self.settings
         is_reference = contender.label == PLANNER and PLANNER not in s.policies
         return min(s.episodes, s.planner_episodes) if is_reference else s.episodes
+
+    @contextlib.contextmanager
+    def played_on_ray(self, ray: bool | str, progress: Callable[[int, int], object]) -> Iterator[None]:
+        """Play all at once on a Ray cluster; finished shards are kept until the context ends without an exception.
+
+        ``progress`` is called with the number of finished shards and of all.
+        """
+        ready: dict[Key, Evaluation] = {}
+        for scenario, contender in itertools.product(self.scenarios, self.contenders):
+            for k, policy in enumerate(contender.policies):
+                key, limit = (scenario.name, contender.label, k), self.settings.time_limit
+                try:
+                    if isinstance(policy, str):
+                        check_code(policy)
+                    with played_errors():
+                        ready[key] = prepare(policy, scenario, self.episodes(contender), time_limit=limit, **self.place)
+                except (PolicyError, PlayError) as error:
+                    self.played[key] = error
+        total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
+        with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
+            self.played |= zip(ready, results, strict=True)
+            yield
 
     def play(self, scenario: Scenario | Family, report: Callable[[str], object]) -> None:
         """Play one scenario with every contender, and write the rows."""
@@ -225,7 +248,7 @@ class Comparison:
             self.failed.append({**why, "why": self.stopped[label]})
             return None
         try:
-            return play(contender, scenario, self.episodes(contender), self.game, self.played)
+            return Plays(contender.label, tuple(self._results(contender, scenario)))
         except PolicyError as error:
             self.left_out.append({**why, "why": str(error)})
         except TimeLimitError as error:  # the next scenario would most likely take as long
@@ -234,6 +257,21 @@ class Comparison:
         except PlayError as error:
             self.failed.append({**why, "why": str(error)})
         return None
+
+    def _results(self, contender: Contender, scenario: Scenario | Family) -> Iterator[Results]:
+        """Play with every policy of a contender, but for what has been played already, and raise its errors."""
+        for k, policy in enumerate(contender.policies):
+            found = self.played.get((scenario.name, contender.label, k))
+            if isinstance(found, Exception):
+                raise found
+            yield found or self._done(_evaluate, policy, self.place, scenario, self.episodes(contender))
+
+    def _done(self, function: Callable[..., Any], policy: Policy | str, *arguments: Any) -> Any:
+        """Return what a function does with a policy; with code in a process of its own."""
+        is_code = isinstance(policy, str)
+        return (
+            apart(self.settings.time_limit, function, policy, *arguments) if is_code else function(policy, *arguments)
+        )
 
     def _stem(self, wanted: str) -> str:
         """Return a name of letters, digits and ``._-`` that no other file has, also where case is ignored."""
@@ -248,35 +286,44 @@ class Comparison:
         from posse_training.compare import figures, report  # matplotlib is slow
 
         s = self.settings
-        self.figures = figures.draw(self.folder, self.plays, self.contenders)
         shown = [(one, *self._record(one)) for one in report.extremes(self.plays, self.reference, s.replays)]
         versions = ", ".join(f"{scenario.name} v{scenario.version}" for scenario in self.scenarios)
         text = report.page(
-            f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
-            f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
-            self.reference,
             self.rows,
-            self.figures,
-            shown,
-            {"Left out": self.left_out, "Failed": self.failed},
+            figures.draw(self.folder, self.plays, self.contenders),
+            title=f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
+            facts=f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
+            baseline=self.reference,
+            replays=shown,
+            problems={"Left out": self.left_out, "Failed": self.failed},
         )
         (self.folder / REPORT).write_text(text, encoding="utf-8")
 
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
         by_label = {each.label: each for each in self.contenders}
-        given, game = next(each for each in self.scenarios if each.name == one.scenario), self.game
-        scenario, _ = next(blocks(given, range(one.world, one.world + 1), game.seed, game.split))
+        given, s = next(each for each in self.scenarios if each.name == one.scenario), self.settings
+        scenario, _ = next(blocks(given, range(one.world, one.world + 1), s.seed, s.split))
         try:
             replays = [
-                replay(by_label[label], seed, scenario, one.world, game)
+                self._done(_record, by_label[label].policies[seed], self.place, label, scenario, one.world)
                 for label, seed in ((self.reference, 0), (one.policy, one.seed))
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
             write_replay(join(replays), self.folder / name)
-        except (PolicyError, PlayError, SettingsError, TimeLimitError) as error:
+        except (PolicyError, PlayError, SettingsError) as error:
             return "", f"no replay: {error}"
         return name, ""
+
+
+def _evaluate(policy: str | Policy, place: dict[str, Any], scenario: Scenario | Family, episodes: int) -> Results:
+    with played_errors():
+        return evaluate(policy, scenario, episodes, progress=False, **place)
+
+
+def _record(policy: str | Policy, place: dict[str, Any], label: str, scenario: Scenario, world: int) -> Replay:
+    with played_errors():
+        return record([(label, policy)], scenario, world=world, observations=False, **place)
 
 
 def _facts(settings: Settings) -> str:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
-from posse_training.errors import PlayError, TimeLimitError
+from posse_training.errors import PlayError
 from posse_training.evaluation.evaluation import played_errors
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
@@ -36,11 +36,11 @@ class Contender:
     policies: tuple[Policy | str, ...]
 
 
-def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Contender, ...]:
+def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     """Return the contenders of names, files, ``package.module:Class`` or ``LABEL=FILE,FILE,...``.
 
     The label of a file is the name on its card, unless another contender has it. Code is loaded in a process of its
-    own, for at most ``limit`` seconds or :data:`LOADING`; code that hangs there fails later, where it is to play.
+    own, and code that fails there fails later, where it is to play.
 
     Raises:
         PolicyError: No contender, a policy that cannot be loaded, a group without files, or a label that two
@@ -58,7 +58,10 @@ def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Conte
         if label in taken:
             raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
-        policies = tuple(_checked_code(name, limit) if is_code(name) else load(name) for name in names)
+        policies = tuple(name if is_code(name) else load(name) for name in names)
+        for name in filter(is_code, names):
+            with contextlib.suppress(PlayError):
+                check_code(name)
         if not sign and not isinstance(policies[0], str) and is_file(text):
             name = policies[0].name
             label = name if name not in taken | stated else label
@@ -66,26 +69,19 @@ def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Conte
     return tuple(found)
 
 
-def check_code(name: str, limit: float) -> None:
+def check_code(name: str) -> None:
     """Load ``package.module:Class`` in a process of its own.
 
     Raises:
         PolicyError: It is no policy.
-        TimeLimitError: It took longer than the limit or :data:`LOADING`, s.
-        PlayError: The process died.
+        PlayError: It took longer than :data:`LOADING`, or the process died.
     """
-    apart(min(limit, LOADING), _load, name)
+    apart(LOADING, _load, name)
 
 
 def _load(name: str) -> None:
     with played_errors():
         load(name)
-
-
-def _checked_code(name: str, limit: float) -> str:
-    with contextlib.suppress(PlayError, TimeLimitError):
-        check_code(name, limit)
-    return name
 
 
 @dataclass(frozen=True)

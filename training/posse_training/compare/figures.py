@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from posse import Scenario
 from posse_training.compare.contenders import Contender, Plays
 from posse_training.evaluation.statistics import over_seeds, share
-from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain, save
+from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain, save, subplots
 
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",
@@ -50,8 +50,7 @@ def draw(folder: Path, plays: Found, contenders: Sequence[Contender]) -> list[Pa
 def scores(plays: Found, looks: Looks) -> Figure:
     """Draw the mean safe score of every policy on every scenario, with its interval."""
     names, policies = _order(plays, looks)
-    figure = Figure(figsize=(WIDTH, 1.3 + len(names) * (0.2 + 0.11 * len(policies))), layout="constrained")
-    axis = figure.subplots()
+    figure, axis = subplots(1, 1, (WIDTH, 1.3 + len(names) * (0.2 + 0.11 * len(policies))))
     for row, name in enumerate(names):
         if row % 2:
             axis.axhspan(row - 0.5, row + 0.5, color=BAND, zorder=0, linewidth=0)
@@ -78,8 +77,9 @@ def profile(plays: Found, looks: Looks) -> Figure:
     names, policies = _order(plays, looks)
     columns = 4 if len(names) > 6 else min(3, len(names))
     rows = -(-len(names) // columns)
-    figure = Figure(figsize=(WIDTH, 1.1 + 1.6 * rows), layout="constrained")
-    axes = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    size = (WIDTH, 1.1 + 1.6 * rows)
+    figure, grid = subplots(rows, columns, size, squeeze=False, sharex=True, sharey=True)
+    axes = list(grid.flat)
     at = np.linspace(0, 1, 201)
     for axis, name in zip(axes, names, strict=False):
         axis.set_title(_versioned(plays, name), fontweight="bold")
@@ -113,8 +113,7 @@ def curves_of(contenders: Sequence[Contender]) -> list[tuple[str, Any]]:
 
 def learning(curves: Sequence[tuple[str, Any]], looks: Looks) -> Figure:
     """Draw the safe score on validation worlds over training steps, with its interval."""
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    axis = figure.subplots()
+    figure, axis = subplots(1, 1, (WIDTH, 3.6))
     for label, (steps, value, low, high) in curves:
         axis.fill_between(steps / 1e6, low, high, color=looks[label].colour, alpha=0.15, linewidth=0)
         axis.plot(steps / 1e6, value, **looks[label].point)
@@ -126,8 +125,7 @@ def learning(curves: Sequence[tuple[str, Any]], looks: Looks) -> Figure:
 
 def recovery(losses: Sequence[Plays], looks: Looks) -> Figure:
     """Draw the share of teams that have settled again by a time after their leader broke."""
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    axis = figure.subplots()
+    figure, axis = subplots(1, 1, (WIDTH, 3.6))
     scenario = losses[0].scenario
     assert isinstance(scenario, Scenario)
     # After this time, an episode may end before a recovery counts.

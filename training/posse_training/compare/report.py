@@ -57,36 +57,12 @@ def extremes(plays: Mapping[tuple[str, str], Plays], reference: str, count: int)
     return wins[:count] + losses[:count]
 
 
-def page(
-    title: str,
-    facts: str,
-    baseline: str,
-    rows: Sequence[Row],
-    figures: Sequence[Path],
-    replays: Sequence[tuple[Extreme, str, str]],
-    problems: Mapping[str, Sequence[Mapping[str, str]]],
-) -> str:
+def page(rows: Sequence[Row], figures: Sequence[Path], **values: Any) -> str:
     """Return the page; names and messages of policies are text in it, whatever they hold.
 
-    Args:
-        title: Heading of the page.
-        facts: What was played.
-        baseline: Label of the baseline.
-        rows: Estimates.
-        figures: Files of the figures, in the page's folder.
-        replays: Worlds, each with the address of its replay, or else why there is none.
-        problems: Who was left out and who failed, by heading.
+    Beside the rows and the figures' files, ``report.html`` names the values that it shows.
     """
     text = (resources.files(__package__) / "report.html").read_text(encoding="utf-8")
-    values: dict[str, Any] = {
-        "title": title,
-        "facts": facts,
-        "baseline": baseline,
-        "columns": COLUMNS,
-        "rows": ranked(rows),
-        "cell": cell,
-        "figures": [(path.name, CAPTIONS[path.stem]) for path in figures if path.suffix == ".svg"],
-        "replays": replays,
-        "problems": problems,
-    }
+    values |= {"columns": COLUMNS, "rows": ranked(rows), "cell": cell}
+    values["figures"] = [(path.name, CAPTIONS[path.stem]) for path in figures if path.suffix == ".svg"]
     return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(text).render(values)

@@ -21,24 +21,18 @@ Row = dict[str, Any]
 """The estimates of one policy on one scenario."""
 COLUMNS: Final = {
     "safe_score": "safe score",
-    "of_planner": "of the planner's",
+    "of_planner": "of the\nplanner's",
     "score": "score",
-    "contact_free": "contact-free",
+    "contact_free": "contact\nfree",
     "settled": "settled",
     "difference": "difference",
-    "improvement": "better in",
+    "improvement": "better\nin",
     "interquartile_mean": "IQM",
     "bound": "bound",
 }
 """Estimates and their headers, as the report shows them."""
-_SHORT: Final = {
-    "safe_score": "safe score",
-    "of_planner": "of the\nplanner's",
-    "contact_free": "contact-\nfree",
-    "difference": "difference",
-    "improvement": "better\nin",
-}
-"""Columns that fit into 80 characters beside the name of a policy, and their headers."""
+_SHORT: Final = ("safe_score", "of_planner", "contact_free", "difference", "improvement")
+"""Columns that fit into 80 characters beside the name of a policy."""
 
 
 def row_of(plays: Plays, reference: Plays | None) -> Row:
@@ -75,8 +69,8 @@ def table(rows: Sequence[Row], title: str) -> Table:
     """Return the most important estimates, each interval below its value."""
     shown = Table(title=Text(title), box=box.HORIZONTALS, padding=0, show_edge=False)
     shown.add_column("policy", overflow="fold")
-    for header in _SHORT.values():
-        shown.add_column(header, no_wrap=True)
+    for name in _SHORT:
+        shown.add_column(COLUMNS[name], no_wrap=True)
     before = None
     for row in ranked(rows):
         if row["scenario"] != before:

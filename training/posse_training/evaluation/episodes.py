@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from posse import Batch, Family, Scenario
+from posse import Family, Scenario
 from posse.scenarios.family import blocks
-from posse_baselines import Played, Policy, Target, batch_for, load, rollout
-from posse_training.errors import TimeLimitError, TrainedSplitError
+from posse_baselines import Policy, Target, batch_for, load, rollout
+from posse_training.errors import TrainedSplitError
 from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
 
@@ -28,24 +24,6 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
         )
 
 
-def limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
-    """Return a function that calls another one, and raises once a time limit is exceeded."""
-    if time_limit is None:
-        return advance
-    ends = time.monotonic() + time_limit
-
-    def check(steps: int) -> None:
-        if time.monotonic() > ends:
-            raise TimeLimitError(f"it exceeded the time limit of {time_limit:g} s")
-        advance(steps)
-
-    return check
-
-
-def no_report(steps: int) -> None:
-    """Take the number of steps that were played, and do nothing."""
-
-
 class Match(NamedTuple):
     """Who plays against whom, and where."""
 
@@ -58,57 +36,17 @@ class Match(NamedTuple):
 
 
 def play_shard(
-    match: Match, shard: range, *, num_threads: int | None = None, advance: Callable[[int], object] = no_report
+    match: Match, shard: range, *, num_threads: int | None = None, advance: Callable[[], object] = lambda: None
 ) -> dict[str, Column]:
-    """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
+    """Play one episode in every world of a shard; return every metric by name, (worlds,).
+
+    ``advance`` is called after each control step of a batch.
+    """
     policy = load(match.policy) if isinstance(match.policy, str) else match.policy
     where: dict[str, Any] = {"seed": match.seed, "split": match.split}
     played = []
     for one, worlds in blocks(match.scenario, shard, **where):
         place = {**where, "first_world": worlds.start, "num_threads": num_threads}
         batch = batch_for(policy, one, len(worlds), match.target, **place)
-        played.append(play_episode(batch, policy, advance))
+        played.append(rollout(batch, policy, after_step=lambda _: advance()).metrics)
     return joined(played)
-
-
-def play_episode(batch: Batch, policy: Policy, advance: Callable[[int], object] = no_report) -> dict[str, Column]:
-    """Play one episode in every world of a batch; return every metric by name, (E,).
-
-    They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
-    changed, ``nan`` for policies without leaders.
-    """
-    exchanges = ExchangeCounter(batch.num_worlds)
-
-    def note(step: Played) -> None:
-        exchanges.count(policy.annotations(step.memory).get("leader"), step.running)
-        advance(1)
-
-    return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
-
-
-def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return whom more than half of a team follow, (E,) of the leader of each tracker, (E, N); -1: there is none."""
-    n = leaders.shape[1]
-    middle = np.sort(leaders, axis=1)[:, n // 2]  # a leader of more than half stands there
-    agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
-    return np.where(agreed, middle, -1)
-
-
-class ExchangeCounter:
-    """Counts in each world how often the leader of the majority changes."""
-
-    def __init__(self, num_worlds: int) -> None:
-        self.total: Column = np.full(num_worlds, np.nan)
-        self._leader = np.full(num_worlds, -1)
-        self._seen: npt.NDArray[Any] = np.empty(0)
-
-    def count(self, leaders: npt.NDArray[Any] | None, running: npt.NDArray[np.bool_]) -> None:
-        """Add one step: the leader of each tracker, (E, N); ``None``: there is none."""
-        if leaders is None or np.array_equal(leaders, self._seen):
-            return
-        self._seen = leaders.copy()
-        chosen = majority(leaders)
-        known = (chosen >= 0) & running
-        self.total[known & np.isnan(self.total)] = 0
-        self.total[known & (self._leader >= 0) & (chosen != self._leader)] += 1
-        self._leader[known] = chosen[known]

@@ -19,8 +19,8 @@ from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
-from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
-from posse_training.evaluation.episodes import Match, limited, no_report, play_shard, refuse_trained_split
+from posse_training.errors import PlayError, SettingsError, TrainedSplitError, describe
+from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
@@ -36,9 +36,8 @@ def evaluate(
     *,
     target: str | Target | None = None,
     split: str = "test",
-    progress: bool | Callable[[int], object] = True,
+    progress: bool = True,
     num_threads: int | None = None,
-    time_limit: float | None = None,
     ray: bool | str = False,
     **overrides: Any,
 ) -> Results:
@@ -53,11 +52,8 @@ def evaluate(
         target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
             scenario's own motion.
         split: Split of the worlds; no training and no tuning uses ``"test"``.
-        progress: Whether to show a bar; or a function that is called after each control step with
-            the number of steps played, 1; on a cluster after each shard, with its steps.
+        progress: Whether to show a bar.
         num_threads: Threads that step the worlds; never changes a result; on a cluster one a shard.
-        time_limit: Time for all episodes, on a cluster for each shard, s, checked after each
-            control step; default: none.
         ray: Play on a Ray cluster (extra ``cluster``): its address; ``True`` for the cluster of
             this machine, or else all its cores.
         **overrides: Settings of the scenario.
@@ -66,26 +62,20 @@ def evaluate(
         SettingsError: ``episodes`` below 1.
         PolicyError: An unknown policy or target, or one that does not fit.
         TrainedSplitError: A split that the policy or the target was trained on.
-        TimeLimitError: The time limit is exceeded.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
         MissingExtraError: Ray is to be used and not installed.
         ClusterError: There is no such cluster, or one of its nodes has other versions.
         PlayError: The policy failed on the cluster, or its workers died again and again.
     """
     given = scenario_or_family(scenario, **overrides)
-    one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit)
-    with progress_bar(disable=progress is not True) as bar:
+    one = prepare(policy, given, episodes, seed, target=target, split=split)
+    with progress_bar(disable=not progress) as bar:
         task = bar.add_task(escape(f"{one.policy.name} on {one.match.scenario.name}"), total=one.steps)
-
-        def advance(steps: int) -> None:
-            bar.advance(task, steps)
-
-        report = progress if callable(progress) else advance
         if ray is False:
-            report = limited(report, time_limit)
-            play = partial(play_shard, one.match._replace(policy=one.policy), num_threads=num_threads, advance=report)
-            return one.results(joined(list(map(play, one.shards))))
-        with gathered_results([one], ray, lambda: report(one.steps // len(one.shards))) as (found,):
+            match, advance = one.match._replace(policy=one.policy), partial(bar.advance, task)
+            parts = [play_shard(match, shard, num_threads=num_threads, advance=advance) for shard in one.shards]
+            return one.results(joined(parts))
+        with gathered_results([one], ray, lambda: bar.advance(task, one.steps // len(one.shards))) as (found,):
             if isinstance(found, Exception):
                 raise found
             return found
@@ -100,11 +90,7 @@ class Evaluation:
     """What a worker of a cluster gets, with a name that it can load itself if there is one for the policy."""
     shards: Sequence[range]
     time_limit: float | None
-
-    @property
-    def job(self) -> Job:
-        """The evaluation for a cluster."""
-        return Job(_play_on_worker, (self.match, self.time_limit), self.shards)
+    """Of a shard that code plays on a cluster, s."""
 
     @property
     def steps(self) -> int:
@@ -129,7 +115,7 @@ def prepare(
     split: str = "test",
     time_limit: float | None = None,
 ) -> Evaluation:
-    """Return an evaluation whose arguments are those of :func:`evaluate`, and raise its errors."""
+    """Return an evaluation; arguments and errors are those of :func:`evaluate`, and a time limit of code, s."""
     if episodes < 1:
         raise SettingsError(f"episodes={episodes} must be at least 1")
     loaded = load(policy) if isinstance(policy, str) else policy
@@ -155,7 +141,8 @@ def gathered_results(
     What is finished is kept until the context ends without an exception; see
     :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
     """
-    with gathered([one.job for one in evaluations], ray, done) as found:
+    jobs = [Job(_play_on_worker, (one.match, one.time_limit), one.shards) for one in evaluations]
+    with gathered(jobs, ray, done) as found:
         both = zip(evaluations, found, strict=True)
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
 
@@ -163,14 +150,14 @@ def gathered_results(
 def _play_on_worker(match: Match, time_limit: float | None, shard: range) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
     if isinstance(match.policy, str) and is_code(match.policy) and time_limit is not None:
-        found: Arrays = apart(time_limit, _play_here, match, time_limit, shard)
+        found: Arrays = apart(time_limit, _play_here, match, shard)
         return found
-    return _play_here(match, time_limit, shard)
+    return _play_here(match, shard)
 
 
-def _play_here(match: Match, time_limit: float | None, shard: range) -> Arrays:
+def _play_here(match: Match, shard: range) -> Arrays:
     with played_errors():
-        return play_shard(match, shard, num_threads=1, advance=limited(no_report, time_limit))
+        return play_shard(match, shard, num_threads=1)
 
 
 @contextmanager
@@ -180,7 +167,7 @@ def played_errors() -> Iterator[None]:
         yield
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
-    except (TimeLimitError, TrainedSplitError, SettingsError, ScenarioError):
+    except (PlayError, TrainedSplitError, SettingsError, ScenarioError):
         raise
     except Exception as error:
         raise PlayError(describe(error)) from None

@@ -121,9 +121,6 @@ def improvement(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
 
     Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. All pairs of
     seeds are compared; the seeds of the first and the worlds are resampled.
-
-    Raises:
-        ValueError: Different numbers of worlds.
     """
     mine, theirs = _paired(first, second)
     higher = ((mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)).mean(axis=1)

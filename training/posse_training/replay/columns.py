@@ -1,4 +1,4 @@
-"""The columns of a recorded episode: names, resolutions and sources.
+"""The columns of a recorded episode, with names, resolutions and sources, and its events.
 
 ========================== ================= ======================================================
 column                     shape of a row    what it holds
@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse_training.replay.episode import Column
+from posse_training.replay.episode import Column, Event
 
 _FINE: Final = 0.001  # m, rad, ...
 _ACTION: Final = 0.004
@@ -46,18 +46,16 @@ _SCORE: Final = 0.0001
 _BELIEF: Final = 0.01
 _FIX: Final = 0.01  # m, of a measured position
 _OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
-STATES: Final = (
-    *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
-    *("tracker_sees", "tracker_slot", "tracker_onsets"),
-    *("tracker_broken_at", "tracker_sensor_dead_from", "tracker_radio_dead_from"),
-    *("odometry_x", "odometry_y", "odometry_heading"),
-    *("tracker_fix_step", "tracker_fix_x", "tracker_fix_y", "tracker_fix_cos", "tracker_fix_sin", "heard_step"),
-    *("world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin"),
-    *("world_frame_cos", "world_frame_sin", "world_pressed", "world_score"),
-    *("world_detected_at", "world_settled_at", "world_recovered_at"),
-    *("world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target"),
-)
-"""Names of the state arrays that columns and events are made of."""
+_MARKS: Final = {
+    "world_detected_at": ("detection", "target detected"),
+    "world_settled_at": ("settled", "settled: every slot held"),
+    "world_recovered_at": ("settled", "settled again after a loss"),
+}
+_TOUCHED: Final = {
+    "world_contacts_tracker": "each other",
+    "world_contacts_obstacle": "an obstacle or wall",
+    "world_contacts_target": "the target",
+}
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
@@ -132,3 +130,47 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
     if states["heard_step"].size:
         columns["heard_step"] = Column(states["heard_step"])
     return columns
+
+
+def find_events(states: Arrays) -> tuple[Event, ...]:
+    """Return the events of an episode in order of time; ``annotation/leader`` (T, N) may be missing, -1: none."""
+    steps = np.arange(len(states["world_step"]))
+    found = []
+    for name, (kind, text) in _MARKS.items():
+        at = int(states[name][-1])
+        if 0 <= at < len(steps):
+            found.append(Event(at, kind, text))
+
+    darts = states["world_pressed"] < 0
+    begins = darts & ~np.concatenate([[False], darts[:-1]])
+    found += [Event(at, "dart", "the target darts") for at in steps[begins].tolist()]
+
+    touching = states["tracker_onsets"] > 0
+    for at in steps[touching.any(axis=1)].tolist():
+        robots = np.flatnonzero(touching[at]).tolist()
+        names = " and ".join(f"tracker {i}" for i in robots)
+        touched = [what for name, what in _TOUCHED.items() if states[name][at] > states[name][max(at - 1, 0)]]
+        text = f"contact: {names}, with {' and '.join(touched) or 'something'}"
+        found.append(Event(at, "contact", text, tuple(robots)))
+
+    broken = states["tracker_broken_at"] <= states["world_step"][:, None]
+    for i in np.flatnonzero(broken.any(axis=0)).tolist():
+        at = int(broken[:, i].argmax())
+        found.append(Event(at, "break", f"tracker {i} breaks", (i,)))
+
+    last = -1
+    for at, leader in enumerate(majority(states.get("annotation/leader", np.empty((0, 1)))).tolist()):
+        if leader >= 0:
+            if last not in (-1, leader):
+                text = f"leader changes from tracker {last} to tracker {leader}"
+                found.append(Event(at, "leader", text, (last, leader)))
+            last = leader
+    return tuple(sorted(found, key=lambda event: event.step))
+
+
+def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return whom more than half of a team follow, (E,) of the leader of each tracker, (E, N); -1: there is none."""
+    n = leaders.shape[1]
+    middle = np.sort(leaders, axis=1)[:, n // 2]  # a leader of more than half stands there
+    agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
+    return np.where(agreed, middle, -1)

@@ -26,11 +26,7 @@ _GREATEST: Final = 2**30
 
 
 def encode(replay: Replay) -> tuple[str, bytes]:
-    """Return the JSON header and the deflated columns.
-
-    Raises:
-        SettingsError: A column with numbers too large for its resolution.
-    """
+    """Return the JSON header and the deflated columns."""
     players, parts = [], []
     for player in replay.players:
         packed = [_pack(name, column) for name, column in player.columns.items()]

@@ -10,18 +10,21 @@ import base64
 import html
 import json
 import re
+import shlex
 import zlib
-from collections.abc import Sequence
+from collections import defaultdict
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
+
 from posse.rendering import style
 from posse_baselines.files import write_atomically
 from posse_training.errors import SettingsError
-from posse_training.replay.episode import Replay
+from posse_training.replay.episode import Player, Replay
 from posse_training.replay.format import decode, encode
-from posse_training.replay.words import command, verdict
 
 PROJECT: Final = "https://github.com/posse-benchmark/posse"  # as in pyproject.toml
 TASK_COLOURS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), (0, 114, 178), (0, 158, 115), (240, 228, 66))
@@ -50,7 +53,6 @@ DARK: Final[dict[str, style.Colour]] = {
 }
 """Colours of the page where the browser prefers a dark scheme; the others are the same."""
 DARK_PLAYERS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), DARK["INK"], (60, 190, 150), (190, 120, 210))
-_SHORT: Final = 24  # letters of a name that a phone shows in one piece
 MODULES: Final = tuple(
     f"{name}.js"
     for name in (
@@ -66,6 +68,9 @@ _DATA: Final = re.compile(
     r'<script type="text/plain" id="data">(.*?)</script>',
     re.DOTALL,
 )
+
+_CAUSES: Final = ("dart", "contact", "break")
+_MOST: Final = 0.6  # of a difference: the cause of so much is named
 
 
 def write_replay(replay: Replay, path: str | Path) -> Path:
@@ -110,8 +115,7 @@ def page(replay: Replay) -> str:
     names = " and ".join(player.name for player in replay.players)
     values = {
         "title": html.escape(f"{names} on {replay.world['scenario']}"),
-        "verdict": (said := html.escape(verdict(replay))),
-        "sentence": _unbroken(said, [player.name for player in replay.players]),
+        "verdict": html.escape(verdict(replay)),
         "command": html.escape(command(replay)),
         "project": PROJECT,
         "style": _file("style.css"),
@@ -122,14 +126,6 @@ def page(replay: Replay) -> str:
     }
     # In one pass, so that inserted text is not searched again.
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
-
-
-def _unbroken(text: str, names: Sequence[str]) -> str:
-    """Return a text in which short names have hyphens at which no browser breaks them."""
-    for name in map(html.escape, names):
-        if len(name) <= _SHORT:
-            text = text.replace(name, name.replace("-", "\u2011"))
-    return text
 
 
 def _code() -> str:
@@ -162,3 +158,59 @@ def _as_data(text: str) -> str:
 
 def _file(name: str) -> str:
     return (resources.files(__package__) / "web" / name).read_text(encoding="utf-8")
+
+
+def verdict(replay: Replay) -> str:
+    """Return a sentence: the share of its slots that each team held, and for two teams where the difference arose.
+
+    A step in which slots are free is put down to the team's last dart, contact or break before it, or, before the team
+    first held as many as in the mean, to the way to the slots.
+    """
+    step = replay.world["settings"]["control_step"]
+    ranked = sorted(replay.players, key=lambda player: -_scores(player).mean())
+    parts = []
+    for place, player in enumerate(ranked):
+        share = f"{100 * _scores(player).mean():.0f} %"
+        contact = next((event.step for event in player.events if event.kind == "contact"), None)
+        after = "" if contact is None else f" (none counts from its contact at {contact * step:.1f} s on)"
+        parts.append(f"{player.name} {'' if place else 'held '}{share}{'' if place else ' of its slots'}{after}")
+    reason = _reason(ranked[0], ranked[1]) if len(ranked) == 2 else ""
+    return f"{', '.join(parts)}{reason}."
+
+
+def command(replay: Replay) -> str:
+    """Return the command line that makes the page again; empty if a player or a setting cannot be given in one."""
+    arguments, options = [player.argument for player in replay.players], replay.world.get("options")
+    return "" if options is None or not all(arguments) else shlex.join(["posse", "replay", *arguments, *options])
+
+
+def _scores(player: Player) -> npt.NDArray[np.float64]:
+    """Return the score of each step, (T,)."""
+    return np.asarray(player.columns["score"].values[1:], np.float64)
+
+
+def _losses(player: Player) -> tuple[dict[str, float], dict[str, int]]:
+    """Return by cause how many steps' worth of slots were free, and in how many events of it any were."""
+    scores = _scores(player)
+    lost, times = defaultdict[str, float](float), defaultdict[str, int](int)
+    begins = {0: "way", int((scores >= scores.mean()).argmax()): ""}
+    there = max(begins)
+    begins |= {e.step - 1: e.kind for e in player.events if e.kind in _CAUSES and e.step - 1 > there}
+    steps = sorted(begins)
+    for first, end in zip(steps, [*steps[1:], len(scores)], strict=True):
+        free = float((1 - scores[first:end]).sum())
+        lost[begins[first]] += free
+        times[begins[first]] += free > 0
+    return lost, times
+
+
+def _reason(first: Player, second: Player) -> str:
+    """Return where most of what the second team fell behind the first arose; empty if nowhere in particular."""
+    (kept, _), (lost, times) = _losses(first), _losses(second)
+    behind = {cause: lost.get(cause, 0.0) - kept.get(cause, 0.0) for cause in dict.fromkeys((*lost, *kept))}
+    total, cause = sum(behind.values()), max(behind, key=lambda cause: behind[cause])
+    if not cause or total < 1 or behind[cause] < _MOST * total:
+        return ""
+    count = f"{times[cause]} {cause}{'s' * (times[cause] != 1)}"
+    place = {"way": "on the way to the slots", "break": f"after {count}"}.get(cause, f"in {count}")
+    return f"; most of the difference arose {place}"

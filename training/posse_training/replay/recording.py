@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+import numpy as np
 import numpy.typing as npt
 
 import posse
@@ -16,12 +17,10 @@ from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
 from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
-from posse_training.replay.columns import STATES, columns_of
+from posse_training.replay.columns import columns_of, find_events
 from posse_training.replay.episode import Player, Replay, join
-from posse_training.replay.events import find_events
 
-_PLACES: Final = ("world_seed", "world_index", "world_episode", "obstacle_x", "obstacle_y", "obstacle_radius")
-RECORD: Final = (*STATES, *_PLACES, "observations", "actions", "terms", "annotations")
+RECORD: Final = ("state", "observations", "actions", "terms", "annotations")
 """Names of the arrays of a trajectory that a replay is made of."""
 _LONGEST_ENTRY: Final = 400  # characters, of a card
 _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")  # fields of the own motion
@@ -135,7 +134,6 @@ def _describe_world(
 ) -> dict[str, Any]:
     """Return the common data of all players of a world, as plain JSON with infinite numbers."""
     scenario = trajectory.scenario
-    start = {name: arrays[name][0].tolist() for name in _PLACES}
     weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
     world = {
         "posse": posse.__version__,
@@ -147,13 +145,13 @@ def _describe_world(
         "changed": {
             name: both for name, both in _changed(scenario).items() if name not in ("name", "meaning", "message_size")
         },
-        "seed": start["world_seed"],
+        "seed": int(arrays["world_seed"][0]),
         "split": trajectory.split,
-        "world": start["world_index"],
-        "episode": start["world_episode"],
+        "world": int(arrays["world_index"][0]),
+        "episode": int(arrays["world_episode"][0]),
         "agents": scenario.num_agents,
         "slots": scenario.slot_offsets,
-        "obstacles": list(zip(*(start[f"obstacle_{name}"] for name in ("x", "y", "radius")), strict=True)),
+        "obstacles": np.stack([arrays[f"obstacle_{name}"][0] for name in ("x", "y", "radius")], axis=-1).tolist(),
         "tasks": TASKS,
         "weights": weights,
         "terms": [_meaning(term) for term in REWARD_TERMS if term.name in weights],

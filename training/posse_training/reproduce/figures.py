@@ -20,7 +20,7 @@ from posse_baselines import DDCS, Trajectory
 from posse_baselines.ddcs import TASKS
 from posse_training.reproduce import runs
 from posse_training.reproduce.runs import relative, slot_error, times, told
-from posse_training.style import BLUE, GREEN, GREY, GRID, INK, ORANGE, PINK, RED, note
+from posse_training.style import BLUE, GREEN, GREY, GRID, INK, ORANGE, PINK, RED, note, subplots
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
 LINES: Final[tuple[Any, ...]] = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3)))
@@ -29,11 +29,6 @@ _AFTER: Final = 1.5  # share of the settling time that curves go on for
 _LEAST: Final = 5.0  # s
 _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
-
-
-def _subplots(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, figure.subplots(rows, columns, **options)
 
 
 def look_of(number: int) -> dict[str, Any]:
@@ -56,7 +51,7 @@ def frames(shown: Sequence[Shown], played: str) -> Figure:
 
     ``played`` is written below: world, split, seed and version.
     """
-    figure, axes = _subplots(len(shown), 3, (9.6, 3.3 * len(shown)), squeeze=False)
+    figure, axes = subplots(len(shown), 3, (9.6, 3.3 * len(shown)), squeeze=False)
     for row, one in zip(axes, shown, strict=True):
         time = times(one.run)
         last = one.settled if np.isfinite(one.settled) else time[-1]
@@ -112,7 +107,7 @@ def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int 
 
 def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
     """Draw every tracker against time, a column for each policy."""
-    figure, axes = _subplots(5, len(shown), (4.6 * len(shown), 8.6), sharex="col", sharey="row", squeeze=False)
+    figure, axes = subplots(5, len(shown), (4.6 * len(shown), 8.6), sharex="col", sharey="row", squeeze=False)
     for column, one in zip(axes.T, shown, strict=True):
         run, world, settled, time = one.run, one.world, one.settled, times(one.run)
         end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else time[-1]
@@ -150,7 +145,7 @@ def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
 
 def tracks(seed: int) -> Figure:
     """Draw one tracker for three K with c = 0, and a team with different K and c."""
-    figure, axes = _subplots(2, 3, (10, 5.2), gridspec_kw={"height_ratios": (1.3, 1)})
+    figure, axes = subplots(2, 3, (10, 5.2), gridspec_kw={"height_ratios": (1.3, 1)})
     alone = posse.get_scenario("constant", num_trackers=1, horizon=300)
     start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
@@ -210,7 +205,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     run = runs.run_of(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
     time, alive, error = times(run), runs.working(run)[:, world], slot_error(run)[:, world]
-    figure, axes = _subplots(4, 1, (8.4, 8.2), gridspec_kw={"height_ratios": (2.6, 2, 1, 1)})
+    figure, axes = subplots(4, 1, (8.4, 8.2), gridspec_kw={"height_ratios": (2.6, 2, 1, 1)})
     start = max(0.0, broke - 5.0)
     end = min(time[-1], max(recovered, broke) + 5.0)
     keep = (time >= start) & (time <= end)

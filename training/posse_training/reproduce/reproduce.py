@@ -14,25 +14,14 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 import tyro
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import write_atomically
 from posse_training.reproduce import runs
 from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
-from posse_training.reproduce.runs import (
-    SPEED_TOLERANCE,
-    SPLIT,
-    TOLERANCE,
-    Floats,
-    draw_starts,
-    median_world,
-    settling_times,
-    slot_error,
-)
+from posse_training.reproduce.runs import SPEED_TOLERANCE, SPLIT, TOLERANCE, Floats
 from posse_training.style import RC, save
 
 HORIZON: Final = 250
@@ -90,16 +79,16 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     """Play every member of the family, write figures and numbers, and return the numbers."""
     settings.out.mkdir(parents=True, exist_ok=True)
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
-    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
+    tracker_pose, target_pose = runs.draw_starts(scenario, settings.starts, settings.seed)
     starts = {"tracker_pose": tracker_pose, "target_pose": target_pose}
     rows, played = [], {}
     for policy in MEMBERS:
         run = runs.run_of(policy, scenario, settings.starts, settings.seed, starts)
-        played[policy] = run, settling_times(run)
-        rows.append(summary(policy, played[policy][1], slot_error(run)[-1]))
+        played[policy] = run, runs.settling_times(run)
+        rows.append(summary(policy, played[policy][1], runs.slot_error(run)[-1]))
     with mpl.rc_context(RC):
         for model in MODELS:
-            world = median_world(played[model.paper_policy][1])
+            world = runs.median_world(played[model.paper_policy][1])
             pair = [
                 Shown(policy, played[policy][0], world, float(played[policy][1][world]))
                 for policy in (model.paper_policy, model.our_policy)
@@ -116,23 +105,21 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
+def table(rows: Sequence[dict[str, Any]], settings: Settings) -> str:
     """Return the settling times with those of the paper."""
-    shown = Table(
-        *("policy", "model", "paper", "median\n\\[quartiles]", "settled", "in slots"),  # not markup
-        title=f"settling time, s: finally within {TOLERANCE:g} m and {SPEED_TOLERANCE:g} m/s;\n"
-        f"{settings.starts:,} starts of {runs.played(posse.get_scenario(PLAYED), settings.seed)}",
-        box=box.HORIZONTALS,
-        padding=0,
-        pad_edge=False,
-        show_edge=False,  # names are whole in 80 columns
-    )
+    game = runs.played(posse.get_scenario(PLAYED), settings.seed)
+    line = "{:<28} {:<11} {:>5}  {:<17} {:>7} {:>8}".format
+    lines = [
+        f"settling time, s: finally within {TOLERANCE:g} m and {SPEED_TOLERANCE:g} m/s;",
+        f"{settings.starts:,} starts of {game}",
+        line("policy", "model", "paper", "median, quartiles", "settled", "in slots"),
+    ]
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
         paper = "-" if row["paper_settling_time"] is None else f"{row['paper_settling_time']:.1f}"
-        median = "-" if middle is None else f"{middle:.1f} \\[{low:.1f}, {high:.1f}]"
-        shown.add_row(row["policy"], row["model"], paper, median, str(row["settled"]), str(row["in_slots"]))
-    return shown
+        median = "-" if middle is None else f"{middle:.1f} [{low:.1f}, {high:.1f}]"
+        lines.append(line(row["policy"], row["model"], paper, median, row["settled"], row["in_slots"]))
+    return "\n".join(lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -144,6 +131,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
         args=arguments,
     )
     rows = reproduce(settings)
-    console = Console()
-    console.print(table(rows, settings))
-    console.print(f"figures and numbers: {settings.out}", markup=False, soft_wrap=True)
+    Console().print(f"{table(rows, settings)}\nfigures and numbers: {settings.out}", markup=False, soft_wrap=True)

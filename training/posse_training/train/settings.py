@@ -16,8 +16,8 @@ from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, load
 from posse_baselines.fields import number
+from posse_baselines.files import read_json
 from posse_training.errors import SettingsError, check_settings
-from posse_training.files import read_json
 from posse_training.options import Changes, MaybeNames, Names, Pairs
 
 Point = dict[str, float]
