@@ -290,7 +290,7 @@ def guard(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, w
     wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
     foresee(team, me)
     discs = work.discs[: surround(team, me, mates, row, work.discs)]
-    velocity, _ = safe_velocity(me, discs, wanted, work.plays)
+    velocity, _ = safe_velocity(me, discs, wanted)
     speed, omega = regulate(me, velocity, 0.0)
     execute(team, me, speed, omega, action)
 

@@ -107,7 +107,7 @@ def carry_out(
     if team.settings.detour > 0.0 and me.task != FLOCKING:
         velocity = detour(team, me, discs, velocity)
     turned = velocity != me.wish
-    velocity, evades = safe_velocity(me, discs, velocity, work.plays)
+    velocity, evades = safe_velocity(me, discs, velocity)
     if turned or evades:
         speed, omega = regulate(me, velocity, 0.0)
     execute(team, me, speed, omega, action)

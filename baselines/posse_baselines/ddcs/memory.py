@@ -31,7 +31,7 @@ from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.offsets import constants_of, offsets_of, unit_of
-from posse_baselines.laws.safeguard import DISC, PLAYS
+from posse_baselines.laws.safeguard import DISC
 
 Kernel = Callable[..., None]
 Seen = npt.NDArray[np.uint16]
@@ -84,15 +84,13 @@ class Work(NamedTuple):
     """(WORK_ROWS, N + 1) for the assignment."""
     discs: Records
     """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
-    plays: Record
-    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
 
 
 def work_for(num_trackers: int) -> Work:
     """Return the arrays of all threads."""
     n, threads = num_trackers, MOST_THREADS
     cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
-    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
+    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))
 
 
 def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:
@@ -232,7 +230,7 @@ def for_each(function: Kernel) -> Kernel:
     def run(minds: Minds, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
         shared = minds.team
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread], works.plays[thread])
+        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
                 function(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], rows[e, i], work, out[e, i])

@@ -265,7 +265,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         read_motion(c, t, me)
         velocity = wanted_velocity(scene, i, me.acceleration)
         discs = work.discs[: surround(scene, i, work.discs)]
-        me.wish, _ = safe_velocity(me, discs, velocity, work.plays)
+        me.wish, _ = safe_velocity(me, discs, velocity)
         v, omega = regulate(me, me.wish, 0.0)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
@@ -279,7 +279,7 @@ def drive_all(
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
     w = teams.work
-    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.plays[thread])
+    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
     copies = len(going) // len(teams.begun)
     for e in range(first, end):
         if going[e]:
