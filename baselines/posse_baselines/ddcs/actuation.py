@@ -93,7 +93,7 @@ def list_near(team: Team, me: Record, mates: Records, row: FloatArray, discs: Re
     for j in range(len(mates)):
         mate = mates[j]
         age = silence(team, me, mate)
-        if j == me.number or mate.step < 0 or age > _FORGOTTEN:
+        if mate.step < 0 or age > _FORGOTTEN:
             continue
         position, velocity = mate_now(team, me, mate)
         way = position - me.position

@@ -93,13 +93,13 @@ def _write_mates(team: Team, me: Record, mates: Records, out: FloatArray) -> Non
     """Write the share of team-mates that are there, and the nearest ones in order."""
     there, last, last_j = 0, -1.0, -1
     for j in range(len(mates)):
-        if j != me.number and is_there(team, me, mates[j]):
+        if is_there(team, me, mates[j]):
             there += 1
     out[0] = there / max(1.0, len(mates) - 1.0)
     for k in range(min(there, MATES)):
         least, best, nearest = 1e9, -1, 0j
         for j in range(len(mates)):
-            if j != me.number and is_there(team, me, mates[j]):
+            if is_there(team, me, mates[j]):
                 way = mate_now(team, me, mates[j])[0] - me.position
                 away = length(way)
                 if (away > last or (away == last and j > last_j)) and away < least:

@@ -191,7 +191,7 @@ class Minds(NamedTuple):
     me: Records
     """(E, N) :data:`MIND`."""
     mates: Records
-    """(E, N, N) :data:`MATE`, the second N by the mate's number."""
+    """(E, N, N) :data:`MATE`, the second N by the mate's number; nothing is ever heard of oneself."""
     seen: Seen
     """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
 

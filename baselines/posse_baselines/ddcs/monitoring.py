@@ -235,7 +235,7 @@ def silence(team: Team, me: Record, mate: Record) -> float:
 
 @compiled
 def is_there(team: Team, me: Record, mate: Record) -> bool:
-    """Return whether a tracker is another one that counts as working and in range."""
+    """Return whether a tracker is another one (nothing is heard of oneself) that counts as working and in range."""
     if mate.step < 0:
         return False
     all_listed = team.at.neighbours >= len(team.slots) - 1

@@ -263,7 +263,7 @@ def second_of(team: Team, me: Record, mates: Records) -> int:
     to_leader = place - team.slots[0]
     for j in range(len(mates)):
         mate = mates[j]
-        if j == me.number or j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
+        if j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
             continue
         if (found >= 0 and mate.slot < mates[found].slot) or not is_there(team, me, mate):
             continue
@@ -389,7 +389,7 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
     lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
     heard = 0
     for m in range(len(mates)):
-        if m != me.number and is_there(team, me, mates[m]):
+        if is_there(team, me, mates[m]):
             heard += 1
     deaf = 1.0 - heard / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
     best, me.goal, me.goal_step = -1e9, 0j, me.step
@@ -417,7 +417,7 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
             if value <= best:
                 continue  # team-mates can only reduce it
             for m in range(len(mates)):
-                if m != me.number and is_there(team, me, mates[m]):
+                if is_there(team, me, mates[m]):
                     # A team-mate's goal counts more than its position.
                     position, _ = mate_now(team, me, mates[m])
                     other = length(place - position - scaled(mates[m].velocity, 2.0))

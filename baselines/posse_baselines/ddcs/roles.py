@@ -71,7 +71,7 @@ def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tupl
     """Return the working tracker other than ``barred`` (-1: any) that is nearest to the target, and its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
-        if j != me.number and j != barred and is_there(team, me, mates[j]):
+        if j != barred and is_there(team, me, mates[j]):
             distance = length(me.target - position_of(team, me, mates, j))
             if distance < least:
                 best, least = j, distance
@@ -214,7 +214,7 @@ def has_precedence(team: Team, me: Record, mates: Records, slot: int) -> bool:
     place = me.target + team.slots[slot] * me.frame
     mine = length(place - me.position)
     for j in range(len(mates)):
-        if j != me.number and mates[j].slot == slot and is_there(team, me, mates[j]):
+        if mates[j].slot == slot and is_there(team, me, mates[j]):
             other = length(place - position_of(team, me, mates, j))
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
                 return True

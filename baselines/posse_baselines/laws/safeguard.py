@@ -81,17 +81,6 @@ def put_walls(discs: Records, count: int, arena: Record, position: complex, radi
 
 
 @compiled
-def half_turn(turn: float) -> complex:
-    """Return the unit vector at half an angle (rad), by short polynomials.
-
-    Half a turn in a step is at most about a quarter of a radian, and low accuracy suffices.
-    """
-    half = 0.5 * turn
-    square = half * half
-    return complex(1.0 - square * (0.5 - square * (1.0 / 24.0)), half * (1.0 - square * (1.0 / 6.0)))
-
-
-@compiled
 def cost_of(
     body: Record, discs: Records, speed: float, error: float, wanted: complex, enough: float
 ) -> tuple[float, float]:
@@ -111,7 +100,7 @@ def cost_of(
         turn_change, change = body.turn_acceleration * step, body.acceleration * step
         omega = clip(turn_command(body, error, step), omega - turn_change, omega + turn_change)
         v = clip(speed * max(0.0, dot(heading, goal)), v - change, v + change)
-        half = half_turn(omega * step)
+        half = vector(1.0, 0.5 * omega * step)
         place += scaled(heading * half, v * step)
         heading = heading * half * half
         error -= omega * step
