@@ -61,6 +61,12 @@ def put_disc(discs: Records, count: int, place: complex, velocity: complex, reac
 
 
 @compiled
+def put_near(discs: Records, count: int, place: complex, velocity: complex, reach: float, margin: float) -> int:
+    """Add a robot as a disc if it is near; return the new count."""
+    return put_disc(discs, count, place, velocity, reach, margin) if dot(place, place) < NEAR * NEAR else count
+
+
+@compiled
 def to_wall(arena: Record, k: int, position: complex) -> float:
     """Return the distance (m) from a position to wall k of :data:`WALLS`.
 

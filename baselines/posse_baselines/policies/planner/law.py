@@ -19,7 +19,7 @@ from posse_baselines.ddcs.memory import UNLIMITED, Work, work_for
 from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
 from posse_baselines.laws.guidance import BODY, regulate, write_motion
-from posse_baselines.laws.safeguard import NEAR, put_disc, put_walls, safe_velocity
+from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
 from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
@@ -197,13 +197,12 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
     c, w, t = scene.config, scene.world, scene.trackers[i]
     count, two = 0, 2.0 * c.robot_radius
     way = complex(w.x, w.y) - complex(t.x, t.y)
-    if dot(way, way) < NEAR * NEAR:
-        count = put_disc(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
+    count = put_near(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
         other = scene.trackers[j]
         way = complex(other.x, other.y) - complex(t.x, t.y)
-        if j != i and dot(way, way) < NEAR * NEAR:
-            count = put_disc(discs, count, way, velocity_of(other), two, _MARGIN)
+        if j != i:
+            count = put_near(discs, count, way, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
         disc = scene.obstacles[k]
         way, reach = complex(disc.x, disc.y) - complex(t.x, t.y), disc.radius + c.robot_radius
