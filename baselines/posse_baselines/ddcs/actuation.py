@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import MOST_WAITING, Team
+from posse_baselines.ddcs.memory import Team, is_due
 from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
 from posse_baselines.laws.guidance import regulate, write_motion
@@ -110,7 +110,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
     strangers = me.known != 0 and few
-    if not strangers or me.step % max(1, round(_TAKEN_TIME / world.dt)) == 0:
+    if not strangers or is_due(team, me, _TAKEN_TIME):
         me.taken = np.uint64(0)
     heading = me.heading * me.turned.conjugate()
     for k in range(at.sonar_beams):
@@ -195,16 +195,9 @@ def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
 
 
 @compiled
-def delay_of(team: Team) -> int:
-    """Return the delay that is foreseen, in control steps."""
-    settings, delay = team.settings, int(team.world.delay)
-    return delay if settings.foresight > 0.0 and delay <= MOST_WAITING else 0
-
-
-@compiled
 def foresee(team: Team, me: Record) -> None:
     """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
-    delay, dt = delay_of(team), float(team.world.dt)
+    delay, dt = int(team.world.delay), float(team.world.dt)
     me.lead, me.moved, me.turned = 0.0, 0j, 1.0 + 0j
     if delay == 0:
         return
@@ -237,7 +230,7 @@ def execute_safely(team: Team, me: Record, discs: Records, velocity: complex, ac
     if turned or evades:
         speed, omega = regulate(me, velocity, 0.0)
     # Made up for the lag, and remembered until it is executed.
-    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), delay_of(team)
+    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), int(team.world.delay)
     speed += more * (speed - me.speed)
     omega += more * (omega - me.omega)
     if delay > 0:

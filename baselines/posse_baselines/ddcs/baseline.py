@@ -30,7 +30,7 @@ from typing import Any, Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, detour, execute_safely, foresee, surround
-from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, read_body
+from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, is_due, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
@@ -91,7 +91,7 @@ def propose(
         me.slot = -1
         if me.task != SEARCHING:
             begin_search(team, me, seen)
-    elif me.slot < 0 or me.step % max(1, round(team.settings.replan_time / team.world.dt)) == 0:
+    elif me.slot < 0 or is_due(team, me, team.settings.replan_time):
         choose_slot(team, me, mates, work)
     me.task = next_task(team, me, mates)
     move(team, me, mates, seen)

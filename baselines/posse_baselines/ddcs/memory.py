@@ -38,8 +38,7 @@ Seen = npt.NDArray[np.uint16]
 """A tracker's map (GRID²,), or (0,): own step + 1 at which a cell was last covered."""
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
-MOST_WAITING: Final = 10
-"""A delay of more control steps than this is not foreseen."""
+_MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
 UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
@@ -65,9 +64,12 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     scenario = layout.scenario
     slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
+    world = constants_of(scenario)
+    if settings.foresight == 0.0 or scenario.command_delay > _MOST_WAITING:
+        world["delay"] = 0
     return Team(
         offsets_of(layout),
-        constants_of(scenario),
+        world,
         settings_record(settings),
         np.array(slots, np.complex64),
         max(map(abs, slots)),
@@ -142,7 +144,7 @@ MIND, MIND_AT_START = _fields(
     ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
     ("wish_omega", np.float64, 0),
     # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
-    ("waiting", (np.complex128, (MOST_WAITING,)), 0),
+    ("waiting", (np.complex128, (_MOST_WAITING,)), 0),
     ("lead", np.float64, 0),  # s; how far position, heading and target are ahead of the observation
     ("moved", np.complex128, 0),  # by then, m
     ("turned", np.complex128, 1),  # by then, as a rotation
@@ -242,6 +244,12 @@ def for_each(function: Kernel) -> Kernel:
 def pair(row: FloatArray, at: int) -> complex:
     """Return the vector whose two components stand at a place of an observation."""
     return complex(row[at], row[at + 1])
+
+
+@compiled
+def is_due(team: Team, me: Record, period: float) -> bool:
+    """Return whether what is done once a period (s) is done in this control step."""
+    return bool(me.step % max(1, round(period / team.world.dt)) == 0)
 
 
 @compiled

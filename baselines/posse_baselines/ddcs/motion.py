@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import GRID, Seen, Team
+from posse_baselines.ddcs.memory import GRID, Seen, Team, is_due
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience, silence
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import (
@@ -328,7 +328,7 @@ def begin_search(team: Team, me: Record, seen: Seen) -> None:
 @compiled
 def look_around(team: Team, me: Record, mates: Records, seen: Seen) -> None:
     """Update the map of areas covered by this tracker and those it hears."""
-    if len(seen) == 0 or me.step % max(1, round(_LOOK_TIME / team.world.dt)) != 0:
+    if len(seen) == 0 or not is_due(team, me, _LOOK_TIME):
         return
     mark_seen(team, me, seen, me.position)
     for j in range(len(mates)):

@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import Team, Work
+from posse_baselines.ddcs.memory import Team, Work, is_due
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
 from posse_baselines.laws.assignment import assign
@@ -134,7 +134,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
         return
     if me.leader == me.number:
-        if me.known and me.step % max(1, round(settings.time_lag / dt)) == 0:
+        if me.known and is_due(team, me, settings.time_lag):
             best, least = nearest_tracker(team, me, mates, -1)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
