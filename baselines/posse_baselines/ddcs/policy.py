@@ -12,7 +12,7 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.baseline import FAMILY, carry_out_all, propose_all
-from posse_baselines.ddcs.belief import BELIEF_SIZE, believe_all
+from posse_baselines.ddcs.belief import BELIEF, believe_all
 from posse_baselines.ddcs.memory import Kernel, Minds, minds_for
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
@@ -89,14 +89,14 @@ class DDCS(OwnArrays, BasePolicy):
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
 
         Ahead and to the left of each tracker, as shares of its greatest speed; with ``believes`` followed by what it
-        believes, in the order of :mod:`posse_baselines.ddcs.belief`: (E, N, 2 + BELIEF_SIZE). The first half of
+        believes, a :data:`~posse_baselines.ddcs.belief.BELIEF`: (E, N, 2 + BELIEF_SIZE). The first half of
         :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
         """
         shape = memory.minds.me.shape
         proposals = self._run(propose_all, observations, memory, np.zeros((*shape, 2), np.float32))
         if believes:
-            beliefs = self._run(believe_all, observations, memory, np.zeros((*shape, BELIEF_SIZE), np.float32))
-            proposals = np.concatenate([proposals, beliefs], axis=-1)
+            beliefs = self._run(believe_all, observations, memory, np.zeros(shape, BELIEF))
+            proposals = np.concatenate([proposals, beliefs.view(np.float32).reshape(*shape, -1)], axis=-1)
         return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
