@@ -13,7 +13,7 @@ import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import GRID, Seen, Team, Work, for_each
-from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there
 from posse_baselines.ddcs.motion import age_of
 from posse_baselines.ddcs.settings import SEARCHING, TASKS
 from posse_baselines.laws.geometry import length, scaled, vector
@@ -87,10 +87,7 @@ def believe(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray,
 @compiled
 def write_mates(team: Team, me: Record, mates: Records, belief: Record) -> None:
     """Write the share of team-mates that are there, and the nearest ones in order."""
-    there, last, last_j = 0, -1.0, -1
-    for j in range(len(mates)):
-        if is_there(team, me, mates[j]):
-            there += 1
+    there, last, last_j = others_there(team, me, mates), -1.0, -1
     belief.present = there / max(1.0, len(mates) - 1.0)
     for k in range(min(there, _MATES)):
         least, best, nearest = 1e9, -1, 0j

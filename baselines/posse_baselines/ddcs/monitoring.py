@@ -243,6 +243,16 @@ def is_there(team: Team, me: Record, mate: Record) -> bool:
 
 
 @compiled
+def others_there(team: Team, me: Record, mates: Records) -> int:
+    """Return how many other trackers count as working and in range."""
+    others = 0
+    for j in range(len(mates)):
+        if is_there(team, me, mates[j]):
+            others += 1
+    return others
+
+
+@compiled
 def mate_now(team: Team, me: Record, mate: Record) -> tuple[complex, complex]:
     """Return the predicted position of a team-mate and its velocity; after a long silence it counts as stopped."""
     age = silence(team, me, mate)

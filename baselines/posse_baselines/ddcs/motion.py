@@ -20,7 +20,7 @@ import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import GRID, Seen, Team, is_due
-from posse_baselines.ddcs.monitoring import is_there, mate_now, patience, silence
+from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience, silence
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import (
     BY_SLOT_FRAME,
@@ -387,11 +387,7 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
     inner_x = world.area_x - min(_OFF_WALL, 0.5 * world.area_x)
     inner_y = world.area_y - min(_OFF_WALL, 0.5 * world.area_y)
     lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
-    heard = 0
-    for m in range(len(mates)):
-        if is_there(team, me, mates[m]):
-            heard += 1
-    deaf = 1.0 - heard / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
+    deaf = 1.0 - others_there(team, me, mates) / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
     best, me.goal, me.goal_step = -1e9, 0j, me.step
     for i in range(GRID):
         for j in range(GRID):

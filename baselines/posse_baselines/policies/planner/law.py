@@ -163,8 +163,8 @@ def arrival_time(scene: Scene, i: int, slot: complex) -> float:
 @compiled
 def assign_slots(scene: Scene, work: Work) -> None:
     """Assign the working trackers to slots with the least total arrival time."""
-    w, plans, rows = scene.world, scene.plans, 0
-    n = scene.config.num_trackers
+    w, plans, n = scene.world, scene.plans, scene.config.num_trackers
+    work.cost[:] = 0.0
     for i in range(n):
         t = scene.trackers[i]
         if t.broken_at != NEVER:
@@ -181,14 +181,11 @@ def assign_slots(scene: Scene, work: Work) -> None:
             time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
-            work.cost[rows, k] = time
-        rows += 1
-    assign(work.cost, rows, n, work.assigning)
-    rows = 0
+            work.cost[i, k] = time
+    assign(work.cost, work.assigning)
     for i in range(n):
         if scene.trackers[i].broken_at == NEVER:
-            plans[i].slot = int(work.assigning[0, rows])
-            rows += 1
+            plans[i].slot = int(work.assigning[0, i])
 
 
 @compiled
