@@ -238,17 +238,18 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[formatio
     ref = place_by(team, me, mate, slot)
     velocity, arm = vector(ref.speed, ref.theta), ref.place - ref.position
     heading = steering.slot_heading(velocity, ref.frame_rate, arm, ref.frame)
-    l_now, angle = guidance.line_of_sight(ref.position, me.position + scaled(me.heading, offset))
-    l_d, wanted = guidance.line_of_sight(ref.position, ref.place + vector(offset, heading))
+    now = me.position + scaled(me.heading, offset) - ref.position
+    wanted, back = arm + vector(offset, heading), vector(1.0, -ref.theta)
     demand = formation.l_phi_demand(
-        formation.Polar(l_now, wrap(angle - ref.theta)),
-        formation.Polar(l_d, wrap(wanted - ref.theta)),
+        now * back,
+        wanted * back,
+        ref.theta - angle_of(me.heading),
         ref.speed,
         ref.frame_rate,
         formation.sampled_rate(settings.alpha_1, me.dt),
         formation.sampled_rate(settings.alpha_2, me.dt),
     )
-    return formation.Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
+    return demand, angle_of(wanted)
 
 
 @compiled
@@ -281,7 +282,7 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     """
     offset = team.settings.point_offset
     demand, wanted = demand_by(team, me, mates[me.leader], 0)
-    velocity = formation.point_velocity(demand)
+    velocity = demand.velocity
     second = second_of(team, me, mates) if team.settings.follower_law == L_L else -1
     if second >= 0:
         other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
