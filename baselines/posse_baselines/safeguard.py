@@ -23,8 +23,7 @@ from pettingzoo.utils import BaseParallelWrapper
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.baseline import guard_all
-from posse_baselines.ddcs.memory import minds_for
-from posse_baselines.laws.offsets import in_units
+from posse_baselines.ddcs.memory import in_units, minds_for
 from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 

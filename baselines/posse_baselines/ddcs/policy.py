@@ -13,10 +13,9 @@ from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.baseline import FAMILY, carry_out_all, propose_all
 from posse_baselines.ddcs.belief import BELIEF, believe_all
-from posse_baselines.ddcs.memory import Kernel, Minds, minds_for
+from posse_baselines.ddcs.memory import Kernel, Minds, in_units, minds_for, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.laws.offsets import in_units, unit_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
 
 

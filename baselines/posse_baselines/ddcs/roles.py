@@ -28,9 +28,8 @@ from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import Team, Work, is_due
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
-from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import dot, length
-from posse_baselines.laws.steering import Course, time_to_slot
+from posse_baselines.laws.steering import Course, assign, time_to_slot
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot

@@ -18,10 +18,9 @@ from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
-from posse_baselines.ddcs.memory import Minds
+from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
-from posse_baselines.laws.offsets import unit_of
 from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
 from posse_baselines.policy import Annotations, Memory, check_observations
 from posse_baselines.tuned import tuned_settings

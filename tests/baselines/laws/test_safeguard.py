@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from posse import get_scenario
+from posse_baselines.ddcs.memory import constants_of
 from posse_baselines.laws.guidance import BODY, regulate
-from posse_baselines.laws.offsets import constants_of
 from posse_baselines.laws.safeguard import DISC, put_disc, put_walls, safe_velocity
 
 DT = 0.1

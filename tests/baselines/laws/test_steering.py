@@ -11,10 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from posse_baselines.laws.assignment import WORK_ROWS, assign
 from posse_baselines.laws.steering import (
     NEVER,
+    WORK_ROWS,
     approach_velocity,
+    assign,
     intercept_time,
     slot_heading,
     slot_velocity,

@@ -16,11 +16,10 @@ from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
 from posse_baselines.ddcs.memory import UNLIMITED, Work, work_for
-from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
 from posse_baselines.laws.guidance import BODY, regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
-from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
+from posse_baselines.laws.steering import Course, approach_velocity, assign, meeting_velocity, time_to_slot, way_round
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
