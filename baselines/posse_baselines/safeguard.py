@@ -44,7 +44,7 @@ class Guard(OwnArrays):
         self._layout, scenario = layout, layout.scenario
         robots = scenario.num_trackers if robots is None else robots
         settings = tuned_settings("ddcs-tuned", scenario)
-        self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
+        self._minds = minds_for(layout, settings, num_worlds, robots)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled, record_type
-from posse_baselines.ddcs.memory import GRID, Seen, Team, Work, for_each
+from posse_baselines.ddcs.memory import GRID, Team, Work, for_each
 from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there
 from posse_baselines.ddcs.motion import age_of
 from posse_baselines.ddcs.settings import SEARCHING, TASKS
@@ -60,7 +60,7 @@ def soft(me: Record, v: complex, scale: float) -> complex:
 
 
 @compiled
-def believe(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, belief: Record) -> None:
+def believe(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, belief: Record) -> None:
     """Write the :data:`BELIEF` of one tracker after it planned; it is 0 before."""
     back = me.heading.conjugate()
     if me.known != 0:
@@ -80,8 +80,8 @@ def believe(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray,
         if me.goal_step >= 0:
             belief.goal = soft(me, me.goal - me.position, _FAR)
     write_mates(team, me, mates, belief)
-    if len(seen) > 0:
-        write_looks(team, me, seen, belief)
+    if team.world.searches:
+        write_looks(team, me, belief)
 
 
 @compiled
@@ -104,7 +104,7 @@ def write_mates(team: Team, me: Record, mates: Records, belief: Record) -> None:
 
 
 @compiled
-def write_looks(team: Team, me: Record, seen: Seen, belief: Record) -> None:
+def write_looks(team: Team, me: Record, belief: Record) -> None:
     """Write how long ago the team covered the places around; 0 beyond the area."""
     world = team.world
     scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
@@ -113,7 +113,7 @@ def write_looks(team: Team, me: Record, seen: Seen, belief: Record) -> None:
         i = math.floor((there.real + world.area_x) * scale_x)
         j = math.floor((there.imag + world.area_y) * scale_y)
         if 0 <= i < GRID and 0 <= j < GRID:
-            belief.looks[k] = age_of(team, me, seen, i, j, False) / team.settings.stale_after
+            belief.looks[k] = age_of(team, me, i, j, False) / team.settings.stale_after
 
 
 believe_all = for_each(believe)

@@ -36,11 +36,11 @@ from posse_baselines.laws.safeguard import DISC
 from posse_baselines.laws.steering import WORK_ROWS
 
 Kernel = Callable[..., None]
-Seen = npt.NDArray[np.uint16]
-"""A tracker's map (GRID²,), or (0,): own step + 1 at which a cell was last covered."""
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
 _MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
+GRID: Final = 16
+"""Cells of a tracker's map of covered areas, along each axis."""
 UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
@@ -82,6 +82,7 @@ CONSTANTS: Final = record_type(
     ("half_width", np.float32),  # of the arena, m
     ("half_height", np.float32),
     ("sight", np.float32),  # how far its target sensor reaches, m
+    ("searches", np.int32),  # 1: it may have to be searched for
     ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
     ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
     ("area_y", np.float32),  # half its height
@@ -133,6 +134,7 @@ def constants_of(scenario: Scenario) -> Records:
     half_width, half_height = (half / unit for half in scenario.half_sides)
     record["half_width"], record["half_height"] = half_width, half_height
     record["area_x"], record["area_y"] = min(half_width, _OPEN_AREA), min(half_height, _OPEN_AREA)
+    record["searches"] = math.isfinite(scenario.sensing_range)
     record["drifts"] = scenario.drifts
     record["walled"] = scenario.walled
     return record
@@ -259,6 +261,7 @@ MIND, MIND_AT_START = _fields(
     ("goal_step", _I, -1),  # own step at which the goal was chosen; -1: there is none
     ("lost_step", _I, -1),  # when the target was lost; -1: never seen yet
     ("area", _C, 0),  # middle of the area that is searched
+    ("seen", (np.uint16, (GRID * GRID,)), 0),  # map of it: own step + 1 at which a cell was last covered
 )
 """Memory of one tracker, and its value at the start of an episode."""
 
@@ -281,9 +284,6 @@ MATE, MATE_AT_START = _fields(
 )
 """Knowledge of a tracker about a team-mate, and its value at the start of an episode."""
 
-GRID: Final = 16
-"""Cells of a tracker's map of covered areas, along each axis."""
-
 
 class Minds(NamedTuple):
     """The memory of a team of N trackers in each of E worlds."""
@@ -293,12 +293,10 @@ class Minds(NamedTuple):
     """(E, N) :data:`MIND`."""
     mates: Records
     """(E, N, N) :data:`MATE`, the second N by the mate's number; nothing is ever heard of oneself."""
-    seen: Seen
-    """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
-        self.me[mask], self.mates[mask], self.seen[mask] = MIND_AT_START, MATE_AT_START, 0
+        self.me[mask], self.mates[mask] = MIND_AT_START, MATE_AT_START
 
     def run(self, kernel: Kernel, rows: FloatArray, out: FloatArray) -> None:
         """Run a kernel of :func:`for_each` on the observations (E, N, F); it writes to ``out`` (E, N, ...)."""
@@ -306,26 +304,25 @@ class Minds(NamedTuple):
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
-        arrays: dict[str, npt.NDArray[Any]] = {"seen": self.seen}
+        arrays: dict[str, npt.NDArray[Any]] = {}
         for name, records in (("me", self.me), ("mates", self.mates)):
             arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
         return arrays
 
 
-def minds_for(layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int, *, searches: bool) -> Minds:
-    """Return the memory of so many robots of a team in each world, with the map that a search needs or without."""
+def minds_for(layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> Minds:
+    """Return the memory of so many robots of a team in each world."""
     minds = Minds(
         team_of(layout, settings),
         np.empty((num_worlds, robots), MIND),
         np.empty((num_worlds, robots, layout.scenario.num_trackers), MATE),
-        np.empty((num_worlds, robots, GRID * GRID if searches else 0), np.uint16),
     )
     minds.restart(np.ones(num_worlds, np.bool_))
     return minds
 
 
 def for_each(function: Kernel) -> Kernel:
-    """Return a kernel that calls ``function(team, me, mates, seen, row, work, out)`` for every tracker."""
+    """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
 
     @kernel
     def run(minds: Minds, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
@@ -334,7 +331,7 @@ def for_each(function: Kernel) -> Kernel:
         work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
-                function(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], rows[e, i], work, out[e, i])
+                function(team, minds.me[e, i], minds.mates[e, i], rows[e, i], work, out[e, i])
 
     return run
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,8 +69,7 @@ class DDCS(OwnArrays, BasePolicy):
         """
         check_fits(self, layout)
         scenario = layout.scenario
-        searches = math.isfinite(scenario.sensing_range)
-        minds = minds_for(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers, searches=searches)
+        minds = minds_for(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
         return _Memory(layout, minds)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
