@@ -21,6 +21,7 @@ from posse.numeric import (
     MOST_THREADS,
     BoolArray,
     FloatArray,
+    OwnArrays,
     Record,
     Records,
     compiled,
@@ -285,22 +286,35 @@ MATE, MATE_AT_START = _fields(
 """Knowledge of a tracker about a team-mate, and its value at the start of an episode."""
 
 
-class Minds(NamedTuple):
-    """The memory of a team of N trackers in each of E worlds."""
+class Minds(OwnArrays):
+    """The memory of a team of N trackers in each of E worlds, or of R robots of it.
 
-    team: Team
-    me: Records
-    """(E, N) :data:`MIND`."""
-    mates: Records
-    """(E, N, N) :data:`MATE`, the second N by the mate's number; nothing is ever heard of oneself."""
+    Args:
+        layout: Of the observations.
+        settings: Of the team.
+        num_worlds: E.
+        robots: R.
+
+    Attributes:
+        layout: Of the observations.
+        team: What the trackers have in common; ``at``, ``world`` and ``settings`` are arrays of one record.
+        me: (E, R) :data:`MIND`.
+        mates: (E, R, N) :data:`MATE`, by the mate's number; nothing is ever heard of oneself.
+    """
+
+    def __init__(self, layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> None:
+        self.layout, self.team = layout, team_of(layout, settings)
+        self.me: Records = np.full((num_worlds, robots), MIND_AT_START)
+        self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE_AT_START)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
         self.me[mask], self.mates[mask] = MIND_AT_START, MATE_AT_START
 
-    def run(self, kernel: Kernel, rows: FloatArray, out: FloatArray) -> None:
-        """Run a kernel of :func:`for_each` on the observations (E, N, F); it writes to ``out`` (E, N, ...)."""
-        over_worlds(kernel, (self, work_for(self.mates.shape[2]), rows, out), *self.me.shape)
+    def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
+        """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
+        work, rows = work_for(self.mates.shape[2]), in_units(self.layout, observations)
+        over_worlds(kernel, (self.team, self.me, self.mates, work, rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
@@ -310,28 +324,26 @@ class Minds(NamedTuple):
         return arrays
 
 
-def minds_for(layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> Minds:
-    """Return the memory of so many robots of a team in each world."""
-    minds = Minds(
-        team_of(layout, settings),
-        np.empty((num_worlds, robots), MIND),
-        np.empty((num_worlds, robots, layout.scenario.num_trackers), MATE),
-    )
-    minds.restart(np.ones(num_worlds, np.bool_))
-    return minds
-
-
 def for_each(function: Kernel) -> Kernel:
     """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
 
     @kernel
-    def run(minds: Minds, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
-        shared = minds.team
+    def run(
+        shared: Team,
+        minds: Records,
+        mates: Records,
+        works: Work,
+        rows: FloatArray,
+        out: FloatArray,
+        thread: int,
+        first: int,
+        end: int,
+    ) -> None:
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
         work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
-                function(team, minds.me[e, i], minds.mates[e, i], rows[e, i], work, out[e, i])
+                function(team, minds[e, i], mates[e, i], rows[e, i], work, out[e, i])
 
     return run
 
