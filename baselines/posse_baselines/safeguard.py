@@ -22,9 +22,8 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
-from posse_baselines.ddcs.actuation import guard_all
-from posse_baselines.ddcs.memory import minds_for
-from posse_baselines.laws.offsets import in_units
+from posse_baselines.ddcs.baseline import guard_all
+from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 
@@ -42,17 +41,17 @@ class Guard(OwnArrays):
     """
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
-        self._layout, scenario = layout, layout.scenario
+        scenario = layout.scenario
         robots = scenario.num_trackers if robots is None else robots
         settings = tuned_settings("ddcs-tuned", scenario)
-        self._minds = minds_for(layout, settings, num_worlds, robots, searches=False)
+        self._minds = Minds(layout, settings, num_worlds, robots)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 
     def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
         """Take the observations (E, R, F) of a control step, in the worlds of a mask (E,) or in all."""
         worlds = ... if mask is None else mask
-        self._observed[worlds] = in_units(self._layout, observations)[worlds]
+        self._observed[worlds] = observations[worlds]
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""

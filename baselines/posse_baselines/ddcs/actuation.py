@@ -17,11 +17,11 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import MOST_WAITING, Seen, Team, Work, for_each, read_body
-from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after, update_mates, watch_target
+from posse_baselines.ddcs.memory import Team, is_due
+from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
 from posse_baselines.laws.guidance import regulate, write_motion
-from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls, safe_velocity, to_wall
+from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_near, put_walls, safe_velocity, to_wall
 from posse_baselines.laws.steering import slot_velocity
 
 _SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
@@ -39,12 +39,19 @@ _ROUNDS: Final = 6
 
 
 @compiled
+def when_observed(me: Record, place: complex, velocity: complex) -> complex:
+    """Return the way to what is ``place`` (m) off when the command is executed, as it was when the sonar measured."""
+    way: complex = place - scaled(velocity, me.lead) + me.moved
+    return way
+
+
+@compiled
 def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading: float) -> bool:
     """Return whether one of the known robots (discs), or a wall, explains a sonar reading (m) along a beam."""
     world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(len(robots)):
-        place = robots[j].place
+        place = when_observed(me, robots[j].place, robots[j].velocity)
         square = dot(place, place)
         if square > reach * reach:
             continue
@@ -52,13 +59,12 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
         along = dot(place, beam)
         if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(cross(place, beam)) < radius + 0.1):
             return True
-    if world.walled:
-        for k in range(4):
-            away, towards = to_wall(world, k, me.position), dot(WALLS[k], beam)
-            if away < NEAR and towards > 0.0:
-                away = away / towards if towards < wide_beam else away
-                if reading >= away - radius - _EXPLAINED:
-                    return True
+    for k in range(4):
+        away, towards = to_wall(world, k, me.position - me.moved), dot(WALLS[k], beam)
+        if away < NEAR and towards > 0.0:
+            away = away / towards if towards < wide_beam else away
+            if reading >= away - radius - _EXPLAINED:
+                return True
     return False
 
 
@@ -70,7 +76,9 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     one of them, moving with the formation.
     """
     for k in range(len(team.slots)):
-        way = me.target + team.slots[k] * me.frame - me.position
+        arm = team.slots[k] * me.frame
+        velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
+        way = when_observed(me, me.target + arm - me.position, velocity)
         distance = length(way)
         fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
         if fits and dot(way, beam) >= team.world.wide_beam * distance:
@@ -79,38 +87,35 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
 
 
 @compiled
-def list_near(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
-    """List the discs that are near the pose from which the robot observes; return their number."""
+def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+    """List the discs that will be near when the command is executed; return their number."""
     at, world, settings = team.at, team.world, team.settings
     count, two, radius = 0, 2.0 * world.radius, float(world.radius)
     if me.known:
-        way = me.target - me.position
-        if dot(way, way) < NEAR * NEAR:
-            # In a chase the target is not avoided: the law ends the chase in time.
-            reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
-            count = put_disc(discs, count, way, me.target_velocity, reach, margin)
+        # In a chase the target is not avoided: the law ends the chase in time.
+        reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
+        count = put_near(discs, count, me.target - me.position, me.target_velocity, reach, margin)
     few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
         age = silence(team, me, mate)
-        if j == me.number or mate.step < 0 or age > _FORGOTTEN:
+        if mate.step < 0 or age > _FORGOTTEN:
             continue
         position, velocity = mate_now(team, me, mate)
         way = position - me.position
         # If it were still there after a silence, it would have a place in the observation.
-        gone = few and age > patience(team, me) and length(way) < me.horizon
-        if dot(way, way) < NEAR * NEAR and not gone:
+        if not (few and age > patience(team, me) and length(way) < me.horizon):
             margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
-            count = put_disc(discs, count, way, velocity, two, margin)
+            count = put_near(discs, count, way, velocity, two, margin)
     robots = count
-    if world.walled:
-        count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
+    count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
     strangers = me.known != 0 and few
-    if not strangers or me.step % max(1, round(_TAKEN_TIME / world.dt)) == 0:
+    if not strangers or is_due(team, me, _TAKEN_TIME):
         me.taken = np.uint64(0)
+    heading = me.heading * me.turned.conjugate()
     for k in range(at.sonar_beams):
         reading = float(row[at.sonar + k])
-        beam = team.beams[k] * me.heading
+        beam = team.beams[k] * heading
         if reading >= world.sonar_range - _EXPLAINED or is_explained(team, me, discs[:robots], beam, reading):
             continue
         slot = slot_in_beam(team, me, beam, reading) if strangers else -1
@@ -119,11 +124,11 @@ def list_near(team: Team, me: Record, mates: Records, row: FloatArray, discs: Re
             arm = team.slots[slot] * me.frame
             velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
             count = put_disc(discs, count, me.target + arm - me.position, velocity, two, settings.margin)
-            continue
-        # Its position within the beam is unknown: a disc that fills most of the beam.
-        wide = min(0.5, 0.4 * (reading + radius))
-        place = scaled(beam, reading + radius + wide)
-        count = put_disc(discs, count, place, 0j, wide + radius, settings.echo_margin)
+        else:
+            # Its position within the beam is unknown: a disc that fills most of the beam.
+            wide = min(0.5, 0.4 * (reading + radius))
+            place = scaled(beam, reading + radius + wide) - me.moved
+            count = put_disc(discs, count, place, 0j, wide + radius, settings.echo_margin)
     return count
 
 
@@ -190,16 +195,9 @@ def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
 
 
 @compiled
-def delay_of(team: Team) -> int:
-    """Return the delay that is foreseen, in control steps."""
-    settings, delay = team.settings, int(team.world.delay)
-    return delay if settings.foresight > 0.0 and delay <= MOST_WAITING else 0
-
-
-@compiled
 def foresee(team: Team, me: Record) -> None:
     """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
-    delay, dt = delay_of(team), float(team.world.dt)
+    delay, dt = int(team.world.delay), float(team.world.dt)
     me.lead, me.moved, me.turned = 0.0, 0j, 1.0 + 0j
     if delay == 0:
         return
@@ -225,27 +223,14 @@ def foresee(team: Team, me: Record) -> None:
 
 
 @compiled
-def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
-    """List the discs that will be near when the command is executed; return their number.
-
-    The sonar measures from the present pose, so that the list is made there and taken along.
-    """
-    lead, position, heading, target = me.lead, me.position, me.heading, me.target
-    frame = me.frame
-    me.lead, me.position, me.heading = 0.0, position - me.moved, heading * me.turned.conjugate()
-    me.target = target - scaled(me.target_velocity, lead)
-    me.frame = frame * vector(1.0, -me.psi_rate * lead)
-    count = list_near(team, me, mates, row, discs)
-    me.lead, me.position, me.heading, me.target, me.frame = lead, position, heading, target, frame
-    for k in range(count):
-        discs[k].place += scaled(discs[k].velocity, lead) - me.moved
-    return count
-
-
-@compiled
-def execute(team: Team, me: Record, speed: float, omega: float, action: FloatArray) -> None:
-    """Write a command (m/s, rad/s), made up for the lag, into an action, and remember it until it is executed."""
-    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), delay_of(team)
+def execute_safely(team: Team, me: Record, discs: Records, velocity: complex, action: FloatArray) -> None:
+    """Write the command for a velocity (m/s), made safe, into an action: that of the law, if it is the wanted one."""
+    speed, omega, turned = me.wish_speed, me.wish_omega, velocity != me.wish
+    velocity, evades = safe_velocity(me, discs, velocity)
+    if turned or evades:
+        speed, omega = regulate(me, velocity, 0.0)
+    # Made up for the lag, and remembered until it is executed.
+    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), int(team.world.delay)
     speed += more * (speed - me.speed)
     omega += more * (omega - me.omega)
     if delay > 0:
@@ -253,9 +238,6 @@ def execute(team: Team, me: Record, speed: float, omega: float, action: FloatArr
         me.waiting[me.step % delay] = kept
     write_motion(action, speed, omega, me.max_speed, me.max_omega)
     me.step += 1
-
-
-# --- wanted velocities that are not the script's -------------------------------------------------
 
 
 @compiled
@@ -275,24 +257,3 @@ def correct(me: Record, correction: complex) -> None:
     me.wish = wish
     me.wish_speed += speed - old_speed
     me.wish_omega += omega - old_omega
-
-
-@compiled
-def guard(team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray) -> None:
-    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten.
-
-    It is relative to the observed heading, and carried out from the pose at which the command is executed.
-    """
-    read_body(team, me, row)
-    watch_target(team, me, row)
-    update_mates(team, me, mates, row)
-    wanted = complex(float(action[0]), float(action[1]))
-    wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
-    foresee(team, me)
-    discs = work.discs[: surround(team, me, mates, row, work.discs)]
-    velocity, _ = safe_velocity(me, discs, wanted, work.plays)
-    speed, omega = regulate(me, velocity, 0.0)
-    execute(team, me, speed, omega, action)
-
-
-guard_all = for_each(guard)

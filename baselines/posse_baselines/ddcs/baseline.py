@@ -29,14 +29,13 @@ from __future__ import annotations
 from typing import Any, Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.actuation import correct, detour, execute, foresee, surround
-from posse_baselines.ddcs.memory import Seen, Team, Work, for_each, read_body
+from posse_baselines.ddcs.actuation import correct, detour, execute_safely, foresee, surround
+from posse_baselines.ddcs.memory import Team, Work, for_each, is_due, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
-from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task
+from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, NO_EXCHANGE, SEARCHING, Settings
-from posse_baselines.laws.guidance import regulate
-from posse_baselines.laws.safeguard import safe_velocity
+from posse_baselines.laws.geometry import length, scaled
 
 BASELINE: Final = Settings(
     model="centralized",
@@ -71,47 +70,57 @@ FAMILY: Final[dict[str, Settings]] = {
 
 
 @compiled
-def propose(
-    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, proposal: FloatArray
-) -> None:
-    """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
-    # Monitoring
+def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
+    """Read what one tracker observes."""
     read_body(team, me, row)
     watch_target(team, me, row)
     update_mates(team, me, mates, row)
-    look_around(team, me, mates, seen)
+
+
+@compiled
+def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, proposal: FloatArray) -> None:
+    """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
+    monitor(team, me, mates, row)
+    look_around(team, me, mates)
     foresee(team, me)
-    # Tracking
     if team.settings.model == CENTRALIZED:
         settle_lead(team, me, mates)
     if me.known == 0:
         me.slot = -1
         if me.task != SEARCHING:
-            begin_search(team, me, seen)
-    elif me.slot < 0 or me.step % max(1, round(team.settings.replan_time / team.world.dt)) == 0:
+            begin_search(team, me)
+    elif me.slot < 0 or is_due(team, me, team.settings.replan_time):
         choose_slot(team, me, mates, work)
     me.task = next_task(team, me, mates)
-    move(team, me, mates, seen)
+    move(team, me, mates)
     own = me.wish * me.heading.conjugate()
     proposal[0], proposal[1] = own.real / me.max_speed, own.imag / me.max_speed
 
 
 @compiled
-def carry_out(
-    team: Team, me: Record, mates: Records, seen: Seen, row: FloatArray, work: Work, action: FloatArray
-) -> None:
+def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
     """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
     correct(me, complex(float(action[0]), float(action[1])))
     discs = work.discs[: surround(team, me, mates, row, work.discs)]
-    velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
+    velocity = me.wish
     if team.settings.detour > 0.0 and me.task != FLOCKING:
         velocity = detour(team, me, discs, velocity)
-    turned = velocity != me.wish
-    velocity, evades = safe_velocity(me, discs, velocity, work.plays)
-    if turned or evades:
-        speed, omega = regulate(me, velocity, 0.0)
-    execute(team, me, speed, omega, action)
+    execute_safely(team, me, discs, velocity, action)
     write_message(team, me, row, action)
 
 
-propose_all, carry_out_all = for_each(propose), for_each(carry_out)
+@compiled
+def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
+    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten.
+
+    It is relative to the observed heading, and carried out from the pose at which the command is executed.
+    """
+    monitor(team, me, mates, row)
+    wanted = complex(float(action[0]), float(action[1]))
+    wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
+    foresee(team, me)
+    want(me, wanted, 0.0)
+    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], wanted, action)
+
+
+propose_all, carry_out_all, guard_all = for_each(propose), for_each(carry_out), for_each(guard)

@@ -3,22 +3,25 @@
 Functions of the DDCS take ``team`` (:class:`Team`), ``me`` (:data:`MIND`, the tracker that decides), ``mates``
 ((N,) :data:`MATE`, by number) and, where they read the observation, its ``row`` (F,). Positions (m), velocities (m/s)
 and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in common axes unless said otherwise. A metre
-(m) is that of robots of 0.15 m radius, :func:`~posse_baselines.laws.offsets.unit_of`.
+(m) is that of robots of 0.15 m radius, as in laws and settings: what smaller and larger robots observe, and the
+constants of their scenario, are converted once, to a unit of :func:`unit_of` metres.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse import ObservationLayout
+from posse import ObservationLayout, Scenario
 from posse.numeric import (
     MOST_THREADS,
     BoolArray,
     FloatArray,
+    OwnArrays,
     Record,
     Records,
     compiled,
@@ -27,29 +30,124 @@ from posse.numeric import (
     record_type,
 )
 from posse.rules import beam_directions
+from posse.scenarios.setting import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import Settings, settings_record
-from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.guidance import BODY
-from posse_baselines.laws.offsets import constants_of, offsets_of, unit_of
-from posse_baselines.laws.safeguard import DISC, PLAYS
+from posse_baselines.laws.safeguard import DISC
+from posse_baselines.laws.steering import WORK_ROWS
 
 Kernel = Callable[..., None]
-Seen = npt.NDArray[np.uint16]
-"""A tracker's map (GRID²,), or (0,): own step + 1 at which a cell was last covered."""
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
-MOST_WAITING: Final = 10
-"""A delay of more control steps than this is not foreseen."""
+_MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
+GRID: Final = 16
+"""Cells of a tracker's map of covered areas, along each axis."""
 UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
+
+
+# --- what a team has in common -------------------------------------------------------------------
+
+_FIELDS: Final = (
+    *("heading", "position", "speed", "turn_rate", "number"),
+    *("max_speed", "max_turn_rate", "acceleration_time", "turn_acceleration_time"),
+    *("target_known", "target_seen", "target_age", "target_range", "target_bearing"),
+    *("target_heading", "target_frame", "target_velocity", "sonar"),
+    *("neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing"),
+    *("neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message"),
+)
+_RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
+_WIDER: Final = 1.2
+_MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
+_OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
+
+OFFSETS: Final = record_type(
+    *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
+    ("neighbours", np.int32),  # places for team-mates
+    ("stride", np.int32),  # length of one team-mate's part
+    ("sonar_beams", np.int32),
+    ("message_size", np.int32),
+)
+"""Offsets of the fields of a layout.
+
+A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
+"""
+
+CONSTANTS: Final = record_type(
+    ("dt", np.float32),  # control step, s
+    ("delay", np.int32),  # control steps after which a command is executed
+    ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
+    ("sonar_range", np.float32),  # reading that means "nothing near", m
+    ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
+    ("radius", np.float32),  # of a robot's disc, m
+    ("walled", np.int32),
+    ("half_width", np.float32),  # of the arena, m
+    ("half_height", np.float32),
+    ("sight", np.float32),  # how far its target sensor reaches, m
+    ("searches", np.int32),  # 1: it may have to be searched for
+    ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
+    ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
+    ("area_y", np.float32),  # half its height
+)
+"""Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
+
+
+def unit_of(scenario: Scenario) -> float:
+    """Return the length (m) that the robots of a scenario take for a metre: 1 at a radius of 0.15 m."""
+    return scenario.robot_radius / _RADIUS
+
+
+def in_units(layout: ObservationLayout, observations: FloatArray) -> FloatArray:
+    """Return observations (E, R, F) whose lengths and speeds are in units of :func:`unit_of`."""
+    unit = unit_of(layout.scenario)
+    if unit == 1.0:
+        return observations
+    converted = observations.copy()
+    views = layout.views(converted)
+    for field in layout.fields:
+        if field.unit in ("m", "m/s"):
+            views[field.name] /= unit
+    return converted
+
+
+def offsets_of(layout: ObservationLayout) -> Records:
+    """Return an array of one :data:`OFFSETS`."""
+    record, scenario = np.zeros(1, OFFSETS), layout.scenario
+    for name in _FIELDS:
+        record[name] = layout.offsets.get(name, -1)
+    record["neighbours"], record["stride"] = layout.neighbours, layout.stride
+    record["sonar_beams"] = scenario.sonar_beams
+    record["message_size"] = scenario.message_size
+    return record
+
+
+def constants_of(scenario: Scenario) -> Records:
+    """Return an array of one :data:`CONSTANTS`."""
+    record, unit = np.zeros(1, CONSTANTS), unit_of(scenario)
+    record["dt"] = scenario.control_step
+    lag = scenario.actuator_lag
+    record["delay"], record["followed"] = scenario.command_delay, 1.0
+    if lag > 0:
+        record["followed"] = 1 - math.exp(-scenario.control_step / lag)
+    record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
+    record["sonar_range"] = scenario.sonar_range / unit
+    record["radius"] = scenario.robot_radius / unit
+    record["sight"] = min(scenario.sensing_range / unit, _MOST_SIGHT)
+    half_width, half_height = (half / unit for half in scenario.half_sides)
+    record["half_width"], record["half_height"] = half_width, half_height
+    record["area_x"], record["area_y"] = min(half_width, _OPEN_AREA), min(half_height, _OPEN_AREA)
+    record["searches"] = math.isfinite(scenario.sensing_range)
+    record["drifts"] = scenario.drifts
+    record["walled"] = scenario.walled
+    return record
 
 
 class Team(NamedTuple):
     """What the trackers of a team have in common."""
 
     at: Record
-    """:data:`~posse_baselines.laws.offsets.OFFSETS`: where each field is in an observation."""
+    """:data:`OFFSETS`: where each field is in an observation."""
     world: Record
-    """:data:`~posse_baselines.laws.offsets.CONSTANTS`: robots and arena."""
+    """:data:`CONSTANTS`: robots and arena."""
     settings: Record
     """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
     slots: npt.NDArray[np.complex64]
@@ -65,14 +163,20 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     scenario = layout.scenario
     slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
+    world = constants_of(scenario)
+    if settings.foresight == 0.0 or scenario.command_delay > _MOST_WAITING:
+        world["delay"] = 0
     return Team(
         offsets_of(layout),
-        constants_of(scenario),
+        world,
         settings_record(settings),
         np.array(slots, np.complex64),
         max(map(abs, slots)),
         (cosines + 1j * sines).astype(np.complex64),
     )
+
+
+# --- memory --------------------------------------------------------------------------------------
 
 
 class Work(NamedTuple):
@@ -84,15 +188,13 @@ class Work(NamedTuple):
     """(WORK_ROWS, N + 1) for the assignment."""
     discs: Records
     """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
-    plays: Record
-    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
 
 
 def work_for(num_trackers: int) -> Work:
     """Return the arrays of all threads."""
     n, threads = num_trackers, MOST_THREADS
     cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
-    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
+    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))
 
 
 def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:
@@ -144,7 +246,7 @@ MIND, MIND_AT_START = _fields(
     ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
     ("wish_omega", np.float64, 0),
     # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
-    ("waiting", (np.complex128, (MOST_WAITING,)), 0),
+    ("waiting", (np.complex128, (_MOST_WAITING,)), 0),
     ("lead", np.float64, 0),  # s; how far position, heading and target are ahead of the observation
     ("moved", np.complex128, 0),  # by then, m
     ("turned", np.complex128, 1),  # by then, as a rotation
@@ -160,6 +262,7 @@ MIND, MIND_AT_START = _fields(
     ("goal_step", _I, -1),  # own step at which the goal was chosen; -1: there is none
     ("lost_step", _I, -1),  # when the target was lost; -1: never seen yet
     ("area", _C, 0),  # middle of the area that is searched
+    ("seen", (np.uint16, (GRID * GRID,)), 0),  # map of it: own step + 1 at which a cell was last covered
 )
 """Memory of one tracker, and its value at the start of an episode."""
 
@@ -182,60 +285,65 @@ MATE, MATE_AT_START = _fields(
 )
 """Knowledge of a tracker about a team-mate, and its value at the start of an episode."""
 
-GRID: Final = 16
-"""Cells of a tracker's map of covered areas, along each axis."""
 
+class Minds(OwnArrays):
+    """The memory of a team of N trackers in each of E worlds, or of R robots of it.
 
-class Minds(NamedTuple):
-    """The memory of a team of N trackers in each of E worlds."""
+    Args:
+        layout: Of the observations.
+        settings: Of the team.
+        num_worlds: E.
+        robots: R.
 
-    team: Team
-    me: Records
-    """(E, N) :data:`MIND`."""
-    mates: Records
-    """(E, N, N) :data:`MATE`, the second N by the mate's number."""
-    seen: Seen
-    """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
+    Attributes:
+        layout: Of the observations.
+        team: What the trackers have in common; ``at``, ``world`` and ``settings`` are arrays of one record.
+        me: (E, R) :data:`MIND`.
+        mates: (E, R, N) :data:`MATE`, by the mate's number; nothing is ever heard of oneself.
+    """
+
+    def __init__(self, layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> None:
+        self.layout, self.team = layout, team_of(layout, settings)
+        self.me: Records = np.full((num_worlds, robots), MIND_AT_START)
+        self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE_AT_START)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
-        self.me[mask], self.mates[mask], self.seen[mask] = MIND_AT_START, MATE_AT_START, 0
+        self.me[mask], self.mates[mask] = MIND_AT_START, MATE_AT_START
 
-    def run(self, kernel: Kernel, rows: FloatArray, out: FloatArray) -> None:
-        """Run a kernel of :func:`for_each` on the observations (E, N, F); it writes to ``out`` (E, N, ...)."""
-        over_worlds(kernel, (self, work_for(self.mates.shape[2]), rows, out), *self.me.shape)
+    def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
+        """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
+        work, rows = work_for(self.mates.shape[2]), in_units(self.layout, observations)
+        over_worlds(kernel, (self.team, self.me, self.mates, work, rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
-        arrays: dict[str, npt.NDArray[Any]] = {"seen": self.seen}
+        arrays: dict[str, npt.NDArray[Any]] = {}
         for name, records in (("me", self.me), ("mates", self.mates)):
             arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
         return arrays
 
 
-def minds_for(layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int, *, searches: bool) -> Minds:
-    """Return the memory of so many robots of a team in each world, with the map that a search needs or without."""
-    minds = Minds(
-        team_of(layout, settings),
-        np.empty((num_worlds, robots), MIND),
-        np.empty((num_worlds, robots, layout.scenario.num_trackers), MATE),
-        np.empty((num_worlds, robots, GRID * GRID if searches else 0), np.uint16),
-    )
-    minds.restart(np.ones(num_worlds, np.bool_))
-    return minds
-
-
 def for_each(function: Kernel) -> Kernel:
-    """Return a kernel that calls ``function(team, me, mates, seen, row, work, out)`` for every tracker."""
+    """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
 
     @kernel
-    def run(minds: Minds, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
-        shared = minds.team
+    def run(
+        shared: Team,
+        minds: Records,
+        mates: Records,
+        works: Work,
+        rows: FloatArray,
+        out: FloatArray,
+        thread: int,
+        first: int,
+        end: int,
+    ) -> None:
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
-        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread], works.plays[thread])
+        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
-                function(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], rows[e, i], work, out[e, i])
+                function(team, minds[e, i], mates[e, i], rows[e, i], work, out[e, i])
 
     return run
 
@@ -244,6 +352,12 @@ def for_each(function: Kernel) -> Kernel:
 def pair(row: FloatArray, at: int) -> complex:
     """Return the vector whose two components stand at a place of an observation."""
     return complex(row[at], row[at + 1])
+
+
+@compiled
+def is_due(team: Team, me: Record, period: float) -> bool:
+    """Return whether what is done once a period (s) is done in this control step."""
+    return bool(me.step % max(1, round(period / team.world.dt)) == 0)
 
 
 @compiled

@@ -235,11 +235,21 @@ def silence(team: Team, me: Record, mate: Record) -> float:
 
 @compiled
 def is_there(team: Team, me: Record, mate: Record) -> bool:
-    """Return whether a tracker is another one that counts as working and in range."""
+    """Return whether a tracker is another one (nothing is heard of oneself) that counts as working and in range."""
     if mate.step < 0:
         return False
     all_listed = team.at.neighbours >= len(team.slots) - 1
     return silence(team, me, mate) <= (patience(team, me) if all_listed else _UNSEEN_MEMORY)
+
+
+@compiled
+def others_there(team: Team, me: Record, mates: Records) -> int:
+    """Return how many other trackers count as working and in range."""
+    others = 0
+    for j in range(len(mates)):
+        if is_there(team, me, mates[j]):
+            others += 1
+    return others
 
 
 @compiled

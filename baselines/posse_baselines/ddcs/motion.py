@@ -19,8 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import GRID, Seen, Team
-from posse_baselines.ddcs.monitoring import is_there, mate_now, patience, silence
+from posse_baselines.ddcs.memory import GRID, Team, is_due
+from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience, silence
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import (
     BY_SLOT_FRAME,
@@ -98,12 +98,12 @@ def want(me: Record, velocity: complex, rate: float) -> None:
 
 
 @compiled
-def move(team: Team, me: Record, mates: Records, seen: Seen) -> None:
+def move(team: Team, me: Record, mates: Records) -> None:
     """Set the motion of a tracker by its task."""
     settings = team.settings
     me.closing = 0
     if me.task == SEARCHING or me.slot < 0:
-        want(me, wander(team, me, mates, seen), 0.0)
+        want(me, wander(team, me, mates), 0.0)
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
     elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
@@ -238,17 +238,18 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[formatio
     ref = place_by(team, me, mate, slot)
     velocity, arm = vector(ref.speed, ref.theta), ref.place - ref.position
     heading = steering.slot_heading(velocity, ref.frame_rate, arm, ref.frame)
-    l_now, angle = guidance.line_of_sight(ref.position, me.position + scaled(me.heading, offset))
-    l_d, wanted = guidance.line_of_sight(ref.position, ref.place + vector(offset, heading))
+    now = me.position + scaled(me.heading, offset) - ref.position
+    wanted, back = arm + vector(offset, heading), vector(1.0, -ref.theta)
     demand = formation.l_phi_demand(
-        formation.Polar(l_now, wrap(angle - ref.theta)),
-        formation.Polar(l_d, wrap(wanted - ref.theta)),
+        now * back,
+        wanted * back,
+        ref.theta - angle_of(me.heading),
         ref.speed,
         ref.frame_rate,
         formation.sampled_rate(settings.alpha_1, me.dt),
         formation.sampled_rate(settings.alpha_2, me.dt),
     )
-    return formation.Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
+    return demand, angle_of(wanted)
 
 
 @compiled
@@ -263,7 +264,7 @@ def second_of(team: Team, me: Record, mates: Records) -> int:
     to_leader = place - team.slots[0]
     for j in range(len(mates)):
         mate = mates[j]
-        if j == me.number or j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
+        if j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
             continue
         if (found >= 0 and mate.slot < mates[found].slot) or not is_there(team, me, mate):
             continue
@@ -281,7 +282,7 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     """
     offset = team.settings.point_offset
     demand, wanted = demand_by(team, me, mates[me.leader], 0)
-    velocity = formation.point_velocity(demand)
+    velocity = demand.velocity
     second = second_of(team, me, mates) if team.settings.follower_law == L_L else -1
     if second >= 0:
         other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
@@ -295,8 +296,8 @@ def follow(team: Team, me: Record, mates: Records) -> None:
 
 
 @compiled
-def mark_seen(team: Team, me: Record, seen: Seen, position: complex) -> None:
-    """Mark the cells of a map (GRID²,) covered by a tracker as covered now."""
+def mark_seen(team: Team, me: Record, position: complex) -> None:
+    """Mark the cells of the map covered by a tracker as covered now."""
     world = team.world
     # In cells from the map's corner; the centre of cell i is at i + 0.5.
     scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
@@ -312,32 +313,32 @@ def mark_seen(team: Team, me: Record, seen: Seen, position: complex) -> None:
         first = max(0, math.ceil(y - half - 0.5))
         last = min(GRID - 1, math.floor(y + half - 0.5))
         for k in range(i * GRID + first, i * GRID + last + 1):
-            seen[k] = me.step + 1
+            me.seen[k] = me.step + 1
 
 
 @out_of_line
-def begin_search(team: Team, me: Record, seen: Seen) -> None:
+def begin_search(team: Team, me: Record) -> None:
     """Mark the target as lost; on the open plane, search around its predicted position."""
     me.lost_step, me.goal_step = me.step, -1
     if team.world.walled == 0 and me.fix_step >= 0:
         me.area = me.target
-        for k in range(len(seen)):
-            seen[k] = 0
+        for k in range(GRID * GRID):
+            me.seen[k] = 0
 
 
 @compiled
-def look_around(team: Team, me: Record, mates: Records, seen: Seen) -> None:
+def look_around(team: Team, me: Record, mates: Records) -> None:
     """Update the map of areas covered by this tracker and those it hears."""
-    if len(seen) == 0 or me.step % max(1, round(_LOOK_TIME / team.world.dt)) != 0:
+    if team.world.searches == 0 or not is_due(team, me, _LOOK_TIME):
         return
-    mark_seen(team, me, seen, me.position)
+    mark_seen(team, me, me.position)
     for j in range(len(mates)):
         if mates[j].step >= 0 and silence(team, me, mates[j]) <= team.settings.lost_after:
-            mark_seen(team, me, seen, mates[j].position)
+            mark_seen(team, me, mates[j].position)
 
 
 @out_of_line
-def wander(team: Team, me: Record, mates: Records, seen: Seen) -> complex:
+def wander(team: Team, me: Record, mates: Records) -> complex:
     """Return the velocity (m/s) of a tracker that searches."""
     settings = team.settings
     way = me.goal - me.position
@@ -345,7 +346,7 @@ def wander(team: Team, me: Record, mates: Records, seen: Seen) -> complex:
     time = (me.step - me.goal_step) * team.world.dt
     arrived = dot(way, way) < near * near and time > _LOOK_TIME
     if me.goal_step < 0 or arrived or time > settings.goal_time:
-        choose_goal(team, me, mates, seen)
+        choose_goal(team, me, mates)
         way = me.goal - me.position
     distance = length(way)
     if distance < 1e-6:
@@ -354,44 +355,40 @@ def wander(team: Team, me: Record, mates: Records, seen: Seen) -> complex:
 
 
 @compiled
-def age_of(team: Team, me: Record, seen: Seen, i: int, j: int, lost: bool) -> float:
+def age_of(team: Team, me: Record, i: int, j: int, lost: bool) -> float:
     """Return the time (s) since a cell (i, j) was last covered, at most ``stale_after``.
 
     With ``lost``, a cell not covered since the target was lost counts as never covered.
     """
     stale = float(team.settings.stale_after)
     # Signed: uncompiled, a cell that was never covered would count as one covered last.
-    looked = np.int64(seen[i * GRID + j]) - 1 if len(seen) > 0 else -1
+    looked = np.int64(me.seen[i * GRID + j]) - 1
     if looked < 0 or (lost and looked < me.lost_step):
         return stale
     return min(float((me.step - looked) * team.world.dt), stale)
 
 
 @compiled
-def age_around(team: Team, me: Record, seen: Seen, i: int, j: int) -> float:
+def age_around(team: Team, me: Record, i: int, j: int) -> float:
     """Return the mean age (s) of the cells in a square as wide as sight around a cell; outside, age is 0."""
     world, total = team.world, 0.0
     wide = max(1, round(_SWATH * world.sight / (2.0 * world.area_x / GRID)))
     high = max(1, round(_SWATH * world.sight / (2.0 * world.area_y / GRID)))
     for k in range(max(0, i - wide), min(GRID, i + wide + 1)):
         for m in range(max(0, j - high), min(GRID, j + high + 1)):
-            total += age_of(team, me, seen, k, m, False)
+            total += age_of(team, me, k, m, False)
     return float(total / ((2 * wide + 1) * (2 * high + 1)))
 
 
 @compiled
-def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
+def choose_goal(team: Team, me: Record, mates: Records) -> None:
     """Set the goal: near, long not covered, and nearer to this tracker than to any other."""
     world, settings = team.world, team.settings
     cell_x, cell_y = 2.0 * world.area_x / GRID, 2.0 * world.area_y / GRID
     inner_x = world.area_x - min(_OFF_WALL, 0.5 * world.area_x)
     inner_y = world.area_y - min(_OFF_WALL, 0.5 * world.area_y)
     lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
-    heard = 0
-    for m in range(len(mates)):
-        if m != me.number and is_there(team, me, mates[m]):
-            heard += 1
-    deaf = 1.0 - heard / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
+    deaf = 1.0 - others_there(team, me, mates) / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
     best, me.goal, me.goal_step = -1e9, 0j, me.step
     for i in range(GRID):
         for j in range(GRID):
@@ -406,9 +403,9 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
                 away = length(place - me.target)
                 if away < lost_within:
                     bonus, lost = settings.lost_worth - _LOST_SLOPE * away, True
-            age = age_of(team, me, seen, i, j, lost)
+            age = age_of(team, me, i, j, lost)
             if settings.swath > 0.0:
-                age += settings.swath * (age_around(team, me, seen, i, j) - age)
+                age += settings.swath * (age_around(team, me, i, j) - age)
             # A tracker that hears few others stays near the middle, where a report is likely heard.
             bonus -= settings.middle_weight * deaf * length(place - me.area)
             way = length(place - me.position)
@@ -417,7 +414,7 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: Seen) -> None:
             if value <= best:
                 continue  # team-mates can only reduce it
             for m in range(len(mates)):
-                if m != me.number and is_there(team, me, mates[m]):
+                if is_there(team, me, mates[m]):
                     # A team-mate's goal counts more than its position.
                     position, _ = mate_now(team, me, mates[m])
                     other = length(place - position - scaled(mates[m].velocity, 2.0))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,18 +10,11 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs.baseline import FAMILY, carry_out_all, propose_all
-from posse_baselines.ddcs.belief import BELIEF_SIZE, believe_all
-from posse_baselines.ddcs.memory import Kernel, Minds, minds_for
+from posse_baselines.ddcs.belief import BELIEF, believe_all
+from posse_baselines.ddcs.memory import Kernel, Minds, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.laws.offsets import in_units, unit_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
-
-
-@dataclass
-class _Memory(OwnArrays):
-    layout: ObservationLayout
-    minds: Minds
 
 
 class DDCS(OwnArrays, BasePolicy):
@@ -71,13 +62,11 @@ class DDCS(OwnArrays, BasePolicy):
         """
         check_fits(self, layout)
         scenario = layout.scenario
-        searches = math.isfinite(scenario.sensing_range)
-        minds = minds_for(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers, searches=searches)
-        return _Memory(layout, minds)
+        return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        memory.minds.restart(mask)
+        memory.restart(mask)
         return memory
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -89,14 +78,14 @@ class DDCS(OwnArrays, BasePolicy):
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
 
         Ahead and to the left of each tracker, as shares of its greatest speed; with ``believes`` followed by what it
-        believes, in the order of :mod:`posse_baselines.ddcs.belief`: (E, N, 2 + BELIEF_SIZE). The first half of
+        believes, a :data:`~posse_baselines.ddcs.belief.BELIEF`: (E, N, 2 + BELIEF_SIZE). The first half of
         :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
         """
-        shape = memory.minds.me.shape
+        shape = memory.me.shape
         proposals = self._run(propose_all, observations, memory, np.zeros((*shape, 2), np.float32))
         if believes:
-            beliefs = self._run(believe_all, observations, memory, np.zeros((*shape, BELIEF_SIZE), np.float32))
-            proposals = np.concatenate([proposals, beliefs], axis=-1)
+            beliefs = self._run(believe_all, observations, memory, np.zeros(shape, BELIEF))
+            proposals = np.concatenate([proposals, beliefs.view(np.float32).reshape(*shape, -1)], axis=-1)
         return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
@@ -105,14 +94,12 @@ class DDCS(OwnArrays, BasePolicy):
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
         give the actions of :meth:`act`.
         """
-        actions = np.zeros((*memory.minds.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
+        actions = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
         actions[..., :2] = corrections
         return self._run(carry_out_all, observations, memory, actions), memory
 
     def _run(self, kernel: Kernel, observations: FloatArray, memory: Memory, out: FloatArray) -> FloatArray:
-        minds: Minds = memory.minds
-        rows = check_observations(self, observations, len(minds.me), memory.layout)
-        minds.run(kernel, in_units(memory.layout, rows), out)
+        memory.run(kernel, check_observations(self, observations, len(memory.me), memory.layout), out)
         return out
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -123,7 +110,7 @@ class DDCS(OwnArrays, BasePolicy):
         -1: there is no estimate). Of the centralized model also ``leader`` (-1: none yet), ``term``
         and ``exchanges`` (number of leader changes).
         """
-        me, unit = memory.minds.me, np.float32(unit_of(memory.layout.scenario))
+        me, unit = memory.me, np.float32(unit_of(memory.layout.scenario))
         names = ["task", "slot"]
         if self.settings.model == "centralized":
             names += ["leader", "term", "exchanges"]
@@ -134,5 +121,5 @@ class DDCS(OwnArrays, BasePolicy):
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
-        minds: Minds = memory.minds
-        return minds.arrays()
+        arrays: dict[str, npt.NDArray[Any]] = memory.arrays()
+        return arrays

@@ -25,12 +25,11 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import Team, Work
-from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, patience
+from posse_baselines.ddcs.memory import Team, Work, is_due
+from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
-from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import dot, length
-from posse_baselines.laws.steering import Course, time_to_slot
+from posse_baselines.laws.steering import Course, assign, time_to_slot
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
@@ -71,7 +70,7 @@ def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tupl
     """Return the working tracker other than ``barred`` (-1: any) that is nearest to the target, and its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
-        if j != me.number and j != barred and is_there(team, me, mates[j]):
+        if j != barred and is_there(team, me, mates[j]):
             distance = length(me.target - position_of(team, me, mates, j))
             if distance < least:
                 best, least = j, distance
@@ -79,37 +78,33 @@ def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tupl
 
 
 @out_of_line
-def central_tracker(team: Team, me: Record, mates: Records) -> tuple[int, int]:
-    """Return the tracker with the least sum of distances to all heard, and their number."""
-    n, others = len(mates), 0
-    best, least = me.number, 1e30
-    for i in range(n):
-        if i != me.number:
-            if not is_there(team, me, mates[i]):
-                continue
-            others += 1
-        position, total = position_of(team, me, mates, i), 0.0
-        for j in range(n):
-            if j != i and (j == me.number or is_there(team, me, mates[j])):
-                total += length(position - position_of(team, me, mates, j))
-        # Ties within rounding go to the lower number.
-        if total < least - 1e-3:
-            best, least = i, total
-    return best, others
+def central_tracker(team: Team, me: Record, mates: Records) -> int:
+    """Return the tracker with the least sum of distances to all heard."""
+    best, least = int(me.number), 1e30
+    for i in range(len(mates)):
+        if i == me.number or is_there(team, me, mates[i]):
+            position, total = position_of(team, me, mates, i), 0.0
+            for j in range(len(mates)):
+                if j == me.number or is_there(team, me, mates[j]):
+                    total += length(position - position_of(team, me, mates, j))
+            # Ties within rounding go to the lower number.
+            if total < least - 1e-3:
+                best, least = i, total
+    return best
 
 
 @compiled
 def select_leader(team: Team, me: Record, mates: Records, barred: int) -> None:
     """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
+    best, term = int(me.number), me.term + 1
     if me.known:
         best, _ = nearest_tracker(team, me, mates, barred)
-        appoint(me, best, (me.term + 1) % COUNT, 0)
-        return
-    best, others = central_tracker(team, me, mates)
-    if others == 0:
-        appoint(me, me.number, (me.term - 1) % COUNT, 0)
+    elif others_there(team, me, mates) == 0:
+        term = me.term - 1
     else:
-        appoint(me, best if best != barred else me.number, (me.term + 1) % COUNT, 0)
+        central = central_tracker(team, me, mates)
+        best = central if central != barred else best
+    appoint(me, best, term % COUNT, 0)
 
 
 @compiled
@@ -134,7 +129,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
         return
     if me.leader == me.number:
-        if me.known and me.step % max(1, round(settings.time_lag / dt)) == 0:
+        if me.known and is_due(team, me, settings.time_lag):
             best, least = nearest_tracker(team, me, mates, -1)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
@@ -148,6 +143,21 @@ def course_of(team: Team, me: Record) -> Course:
     return Course(me.target_velocity, me.target_mean, team.settings.weave_time, me.psi_rate)
 
 
+@compiled
+def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: int) -> float:
+    """Return the time (s) that a tracker takes to slot k, less what the slot is worth."""
+    settings, slot = team.settings, team.slots[k]
+    way = me.target + slot * me.frame - position
+    time = time_to_slot(way, course_of(team, me), me.max_speed)
+    # Time for turning towards it, up to half a turn.
+    facing = dot(way, heading) / max(length(way), 1e-6)
+    time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)
+    # With more slots than trackers, those that see the target are filled first.
+    if dot(slot, slot) < (settings.in_sight * team.world.sight) ** 2:
+        time -= settings.sight_worth
+    return float(time)
+
+
 @out_of_line
 def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     """Set the own slot by the assignment of least total arrival time."""
@@ -155,53 +165,40 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     if settings.radio == 0:
         me.slot = me.number  # no team-mates
         return
-    rows, mine = 0, 0
+    cost[:] = 0.0  # of one that is not there: it takes what is left over
     for j in range(n):
         mate = mates[j]
-        if j == me.number:
-            mine = rows
-            held, heading = me.slot, me.heading
-        elif is_there(team, me, mate):
-            held, heading = mate.slot, mate.heading
-        elif team.at.neighbours < n - 1 and mate.slot >= 0:
+        there = j == me.number or is_there(team, me, mate)
+        if not there and (team.at.neighbours >= n - 1 or mate.slot < 0):
+            continue
+        if not there:
             # It has no place in the observation but claimed a slot. If it were still near its
             # slot, and the slot were near, it would have a place.
             place = me.target + team.slots[mate.slot] * me.frame
             if length(place - me.position) < me.horizon - _IN_PLACE:
                 mate.slot = -1
                 continue
-            for k in range(n):
-                cost[rows, k] = 0.0 if k == mate.slot else _RESERVED
-            rows += 1
-            continue
-        else:
-            continue
+        held, heading = (me.slot, me.heading) if j == me.number else (mate.slot, mate.heading)
         position = position_of(team, me, mates, j)
         for k in range(n):
-            slot = team.slots[k]
-            way = me.target + slot * me.frame - position
-            time = time_to_slot(way, course_of(team, me), me.max_speed)
-            # Time for turning towards it, up to half a turn.
-            facing = dot(way, heading) / max(length(way), 1e-6)
-            time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)
+            if not there:
+                cost[j, k] = 0.0 if k == held else _RESERVED
+                continue
+            time = slot_cost(team, me, position, heading, k)
             if held == k:
                 time -= settings.loyalty
             if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
                 time += _TAKEN_COST
-            # With more slots than trackers, those that see the target are filled first.
-            if dot(slot, slot) < (settings.in_sight * team.world.sight) ** 2:
-                time -= settings.sight_worth
             # The leader of the centralized model takes the first slot.
             if settings.model == CENTRALIZED and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
-            cost[rows, k] = time + 1e-4 * j
-        rows += 1
-    assign(cost, rows, n, work.assigning)
-    slot = int(work.assigning[0, mine])
+            cost[j, k] = time + 1e-4 * j
+    assign(cost, work.assigning)
+    slot = int(work.assigning[0, me.number])
     if me.slot == slot and has_precedence(team, me, mates, slot):
-        cost[mine, slot] = _RESERVED
-        assign(cost, rows, n, work.assigning)
-    me.slot = int(work.assigning[0, mine])
+        cost[me.number, slot] = _RESERVED
+        assign(cost, work.assigning)
+    me.slot = int(work.assigning[0, me.number])
 
 
 @compiled
@@ -214,7 +211,7 @@ def has_precedence(team: Team, me: Record, mates: Records, slot: int) -> bool:
     place = me.target + team.slots[slot] * me.frame
     mine = length(place - me.position)
     for j in range(len(mates)):
-        if j != me.number and mates[j].slot == slot and is_there(team, me, mates[j]):
+        if mates[j].slot == slot and is_there(team, me, mates[j]):
             other = length(place - position_of(team, me, mates, j))
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
                 return True

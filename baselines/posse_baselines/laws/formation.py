@@ -24,61 +24,44 @@ import math
 from typing import NamedTuple
 
 from posse.numeric import Record, compiled
-from posse_baselines.laws.geometry import clip, vector, wrap
-
-
-class Polar(NamedTuple):
-    """Where a control point is, or is wanted, seen from the leader."""
-
-    l: float  # noqa: E741 (the paper's symbol)
-    phi: float
+from posse_baselines.laws.geometry import angle_of, clip, dot, length, vector, wrap
 
 
 class Demand(NamedTuple):
-    """What the law demands of a control point."""
+    """What l-φ demands of a control point."""
 
-    l: float  # noqa: E741
-    velocity: complex
-    """A + iB: along the line of l and to its left, m/s."""
+    l: float  # noqa: E741 (the paper's symbol)
     gamma: float
+    velocity: complex
+    """v_j + i d ω_j, m/s."""
 
 
 @compiled
 def l_phi_demand(
-    now: Polar, wanted: Polar, leader_speed: float, frame_rate: float, alpha_1: float, alpha_2: float
-) -> complex:
-    """Return the wanted velocity A + iB (m/s) of the control point, along the line of l and to its left.
+    now: complex, wanted: complex, turned: float, leader_speed: float, frame_rate: float, alpha_1: float, alpha_2: float
+) -> Demand:
+    """Return the demand on a control point that is, and is wanted, at a position (m) in the leader's own axes.
 
-    ::
+    Its wanted velocity is A along the line of l, and B to its left::
 
-        A =   α_1 (l_d - l)           + v_i cos(φ)
-        B = l α_2 wrap(φ_d - φ)   - v_i sin(φ) + l ω_i
+        A =   α_1 (l_d - l)           + v_i cos(φ)        v_j   = A cos(γ) - B sin(γ)
+        B = l α_2 wrap(φ_d - φ)   - v_i sin(φ) + l ω_i    d ω_j = A sin(γ) + B cos(γ)
 
-    With it, l - l_d decays as exp(-α_1 t) and φ - φ_d as exp(-α_2 t). ``frame_rate`` (rad/s) is
-    ω_i where φ_d is constant in the leader's frame, and dψ/dt where it follows the slot frame.
+    With it, l - l_d decays as exp(-α_1 t) and φ - φ_d as exp(-α_2 t). No γ is singular. ``turned`` (rad) is θ_i - θ_j;
+    ``frame_rate`` (rad/s) is ω_i where φ_d is constant in the leader's frame, and dψ/dt where it follows the slot
+    frame.
     """
-    along = alpha_1 * (wanted.l - now.l) + leader_speed * math.cos(now.phi)
-    turning = alpha_2 * wrap(wanted.phi - now.phi) + frame_rate
-    return complex(along, now.l * turning - leader_speed * math.sin(now.phi))
+    l, phi = length(now), angle_of(now)  # noqa: E741
+    along = alpha_1 * (length(wanted) - l) + leader_speed * math.cos(phi)
+    turning = alpha_2 * wrap(angle_of(wanted) - phi) + frame_rate
+    gamma = phi + turned
+    return Demand(l, gamma, complex(along, l * turning - leader_speed * math.sin(phi)) * vector(1.0, gamma))
 
 
 @compiled
 def sampled_rate(alpha: float, dt: float) -> float:
     """Return the gain (1/s) with which an error decays as exp(-α t) under commands held for dt."""
     return (1.0 - math.exp(-alpha * dt)) / dt
-
-
-@compiled
-def point_velocity(demand: Demand) -> complex:
-    """Return the wanted velocity v_j + i d ω_j (m/s) of the control point.
-
-    ::
-
-        v_j = A cos(γ) - B sin(γ)        d ω_j = A sin(γ) + B cos(γ)
-
-    No γ is singular.
-    """
-    return demand.velocity * vector(1.0, demand.gamma)
 
 
 @compiled
@@ -128,8 +111,8 @@ def l_l_velocity(i: Demand, k: Demand, wanted_crossing: float, min_crossing_sine
     determinant = math.sin(k.gamma - i.gamma)
     side = 1.0 if math.sin(wanted_crossing) >= 0.0 else -1.0
     if side * determinant < min_crossing_sine:
-        return point_velocity(i) if i.l <= k.l else point_velocity(k)
-    a_i, a_k = i.velocity.real, k.velocity.real
+        return i.velocity if i.l <= k.l else k.velocity
+    a_i, a_k = dot(i.velocity, vector(1.0, i.gamma)), dot(k.velocity, vector(1.0, k.gamma))
     speed = (a_i * math.sin(k.gamma) - a_k * math.sin(i.gamma)) / determinant
     sideways = (a_k * math.cos(i.gamma) - a_i * math.cos(k.gamma)) / determinant
     return complex(speed, sideways)

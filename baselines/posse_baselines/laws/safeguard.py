@@ -30,8 +30,6 @@ _DIRECTIONS: Final = 16
 _TURNS: Final = np.array(
     [(1 if k % 2 else -1) * ((k + 1) // 2) * 2.0 * math.pi / _DIRECTIONS for k in range(_DIRECTIONS)]
 )
-_TURNED: Final = np.cos(_TURNS) + 1j * np.sin(_TURNS)
-_PLAYS: Final = _DIRECTIONS * len(_SPEED_LEVELS)
 _KEEP_RIGHT: Final = 0.02  # preference for passing on the right
 _LIKELY: Final = 0.6  # share of a velocity's difference by which the robot ends elsewhere, at least
 _SAME_SPEED: Final = 0.3  # m/s
@@ -51,15 +49,6 @@ DISC: Final = record_type(
 )
 """An object to avoid, relative to the tracker."""
 
-_OF_DIRECTION: Final = ("error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead")
-_OF_PLAY: Final = ("speed", "x", "y", "danger", "going")
-PLAYS: Final = record_type(
-    *((name, np.float64, (_DIRECTIONS,)) for name in _OF_DIRECTION),
-    *((name, np.float64, (_PLAYS,)) for name in _OF_PLAY),
-)
-"""What :func:`play_all` works in: all directions at the first speed, then at the next one. Floats by component, since
-the loops over them are vectorised."""
-
 
 @compiled
 def put_disc(discs: Records, count: int, place: complex, velocity: complex, reach: float, margin: float) -> int:
@@ -69,6 +58,12 @@ def put_disc(discs: Records, count: int, place: complex, velocity: complex, reac
     d = discs[count]
     d.place, d.velocity, d.reach, d.margin = place, velocity, reach, margin
     return count + 1
+
+
+@compiled
+def put_near(discs: Records, count: int, place: complex, velocity: complex, reach: float, margin: float) -> int:
+    """Add a robot as a disc if it is near; return the new count."""
+    return put_disc(discs, count, place, velocity, reach, margin) if dot(place, place) < NEAR * NEAR else count
 
 
 @compiled
@@ -92,17 +87,6 @@ def put_walls(discs: Records, count: int, arena: Record, position: complex, radi
 
 
 @compiled
-def half_turn(turn: float) -> complex:
-    """Return the unit vector at half an angle (rad), by short polynomials.
-
-    Half a turn in a step is at most about a quarter of a radian, and low accuracy suffices.
-    """
-    half = 0.5 * turn
-    square = half * half
-    return complex(1.0 - square * (0.5 - square * (1.0 / 24.0)), half * (1.0 - square * (1.0 / 6.0)))
-
-
-@compiled
 def cost_of(
     body: Record, discs: Records, speed: float, error: float, wanted: complex, enough: float
 ) -> tuple[float, float]:
@@ -122,7 +106,7 @@ def cost_of(
         turn_change, change = body.turn_acceleration * step, body.acceleration * step
         omega = clip(turn_command(body, error, step), omega - turn_change, omega + turn_change)
         v = clip(speed * max(0.0, dot(heading, goal)), v - change, v + change)
-        half = half_turn(omega * step)
+        half = vector(1.0, 0.5 * omega * step)
         place += scaled(heading * half, v * step)
         heading = heading * half * half
         error -= omega * step
@@ -143,64 +127,6 @@ def cost_of(
     top = body.max_speed
     short = scaled(place, 1.0 / (top * _HORIZON)) - complex(wanted.real / top, wanted.imag / top)
     return danger + length(short), danger
-
-
-@compiled
-def play_all(body: Record, discs: Records, error: float, p: Record) -> None:
-    """Simulate all velocities of a :data:`PLAYS` as :func:`cost_of` does one; straight ahead is a turn of ``error``.
-
-    The loops over the 32 velocities have no branches and are vectorised.
-    """
-    goal = body.heading * vector(1.0, error)
-    for k in range(_DIRECTIONS):
-        p.error[k], p.omega[k] = wrap(error + _TURNS[k]), body.omega
-        p.cos[k], p.sin[k] = body.heading.real, body.heading.imag
-        turned = goal * _TURNED[k]
-        p.goal_cos[k], p.goal_sin[k] = turned.real, turned.imag
-    for m in range(_PLAYS):
-        p.speed[m], p.x[m], p.y[m], p.danger[m], p.going[m] = body.speed, 0.0, 0.0, 0.0, 1.0
-    time = 0.0
-    for n in range(len(_STEPS)):
-        step = _STEPS[n]
-        turn_change, change = body.turn_acceleration * step, body.acceleration * step
-        for k in range(_DIRECTIONS):
-            c, s, old = p.cos[k], p.sin[k], p.omega[k]
-            p.ahead[k] = max(0.0, c * p.goal_cos[k] + s * p.goal_sin[k])
-            omega = clip(turn_command(body, p.error[k], step), old - turn_change, old + turn_change)
-            half = half_turn(omega * step)
-            middle_c, middle_s = c * half.real - s * half.imag, s * half.real + c * half.imag
-            p.omega[k], p.middle_cos[k], p.middle_sin[k] = omega, middle_c, middle_s
-            p.cos[k] = middle_c * half.real - middle_s * half.imag
-            p.sin[k] = middle_s * half.real + middle_c * half.imag
-            p.error[k] -= omega * step
-        for level in range(len(_SPEED_LEVELS)):
-            goal_speed = body.max_speed * _SPEED_LEVELS[level]
-            for k in range(_DIRECTIONS):
-                m = level * _DIRECTIONS + k
-                v = clip(goal_speed * p.ahead[k], p.speed[m] - change, p.speed[m] + change)
-                p.speed[m] = v
-                p.x[m] += v * step * p.middle_cos[k]
-                p.y[m] += v * step * p.middle_sin[k]
-        time += step
-        weight = _INTRUSION_COST * step / _HORIZON
-        contact_cost = _CONTACT_COST * (1.2 - time / _HORIZON)
-        for j in range(len(discs)):
-            d = discs[j]
-            place = d.place + scaled(d.velocity, time)
-            x, y, near, hits = place.real, place.imag, d.reach + d.margin, 0
-            for m in range(_PLAYS):
-                dx, dy = x - p.x[m], y - p.y[m]
-                hits += dx * dx + dy * dy < near * near
-            if hits == 0:
-                continue
-            by_margin = 1.0 / max(d.margin, 1e-9)
-            for m in range(_PLAYS):
-                dx, dy = x - p.x[m], y - p.y[m]
-                gap = math.sqrt(dx * dx + dy * dy) - d.reach
-                touches = 1.0 if gap < _CONTACT else 0.0
-                intrusion = max(0.0, 1.0 - gap * by_margin)
-                p.danger[m] += p.going[m] * (touches * contact_cost + (1.0 - touches) * weight * intrusion)
-                p.going[m] *= 1.0 - touches
 
 
 @compiled
@@ -227,11 +153,8 @@ def is_clear(body: Record, discs: Records, wanted: complex) -> bool:
 
 
 @compiled
-def safe_velocity(body: Record, discs: Records, wanted: complex, plays: Record) -> tuple[complex, bool]:
-    """Return a safe velocity (m/s), and whether it differs from the wanted one.
-
-    ``plays`` is a work record, :data:`PLAYS`.
-    """
+def safe_velocity(body: Record, discs: Records, wanted: complex) -> tuple[complex, bool]:
+    """Return a safe velocity (m/s), and whether it differs from the wanted one."""
     if len(discs) == 0 or is_clear(body, discs, wanted):
         return wanted, False
     speed = length(wanted)
@@ -243,22 +166,16 @@ def safe_velocity(body: Record, discs: Records, wanted: complex, plays: Record) 
     cost, _ = cost_of(body, discs, 0.0, 0.0, wanted, least)
     if cost < least:
         least, best = cost, 0j
-    play_all(body, discs, error, plays)
-    # As shares of the greatest speed and distance.
-    top, farthest = body.max_speed, body.max_speed * _HORIZON
-    wish = complex(wanted.real / top, wanted.imag / top)
+    ahead = body.heading * vector(1.0, error)
     for k in range(_DIRECTIONS):
         for level in range(len(_SPEED_LEVELS)):
-            m = level * _DIRECTIONS + k
-            share = scaled(complex(plays.goal_cos[k], plays.goal_sin[k]), _SPEED_LEVELS[level])
+            speed = body.max_speed * _SPEED_LEVELS[level]
+            velocity = scaled(ahead * vector(1.0, _TURNS[k]), speed)
             # A lower limit of the distance from the wanted final position.
-            if _LIKELY * length(share - wish) >= least:
+            if _LIKELY * length(velocity - wanted) >= least * body.max_speed:
                 continue
-            cost = plays.danger[m] + (_KEEP_RIGHT if k % 2 == 1 else 0.0)
-            if plays.going[m] == 0.0:  # it touched something
-                cost += 2.0
-            else:
-                cost += length(complex(plays.x[m] / farthest, plays.y[m] / farthest) - wish)
+            cost, _ = cost_of(body, discs, speed, wrap(error + _TURNS[k]), wanted, least)
+            cost += _KEEP_RIGHT if k % 2 == 1 else 0.0
             if cost < least:
-                least, best = cost, scaled(share, top)
+                least, best = cost, velocity
     return best, True

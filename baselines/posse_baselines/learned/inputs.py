@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
-from posse_baselines.laws.offsets import offsets_of
+from posse_baselines.ddcs.memory import offsets_of
 from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, TEAM, write_features
 from posse_baselines.policy import PolicyError
 

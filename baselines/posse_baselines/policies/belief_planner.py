@@ -18,12 +18,11 @@ from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
-from posse_baselines.ddcs.memory import Minds
+from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
-from posse_baselines.laws.offsets import unit_of
 from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
-from posse_baselines.policy import Annotations, Memory, check_observations
+from posse_baselines.policy import Annotations, Memory, check_fits, check_observations
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
@@ -302,11 +301,12 @@ def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     return np.asarray(np.angle(np.exp(1j * angle)))
 
 
-@dataclass
-class _Memory(OwnArrays):
-    layout: ObservationLayout
-    minds: Minds
-    beliefs: Beliefs
+class _Memory(Minds):
+    """Of the trackers as they monitor and search, and what they believe."""
+
+    def __init__(self, plans: BeliefSettings, layout: ObservationLayout, settings: Settings, num_worlds: int) -> None:
+        super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
+        self.beliefs = Beliefs(plans, layout, num_worlds)
 
 
 class BeliefPlanner(DDCS):
@@ -329,30 +329,29 @@ class BeliefPlanner(DDCS):
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        memory = super().begin(layout, num_worlds)
-        return _Memory(layout, memory.minds, Beliefs(self.plans, layout, num_worlds))
+        check_fits(self, layout)
+        return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
+        memory.beliefs.restart(np.repeat(mask, memory.me.shape[1]))
         return super().restart(memory, mask)
 
     def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
         proposals, memory = super().propose(observations, memory, believes=believes)
-        minds: Minds = memory.minds
-        me, beliefs = minds.me, memory.beliefs
+        me, mates, team, beliefs = memory.me, memory.mates, memory.team, memory.beliefs
         shape = me.shape
         observations = check_observations(self, observations, shape[0], memory.layout)
-        plans = beliefs.search.teams.plans.reshape(minds.mates.shape)
+        plans = beliefs.search.teams.plans.reshape(mates.shape)
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
-            claimed = minds.mates["slot"] >= 0
-            plans["slot"][claimed] = minds.mates["slot"][claimed]
-        actions = beliefs.act(observations, self._working(minds)).reshape(*shape, 2)
+            claimed = mates["slot"] >= 0
+            plans["slot"][claimed] = mates["slot"][claimed]
+        actions = beliefs.act(observations, self._working(memory)).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.
-        made_up = 1.0 + minds.team.settings["foresight"][0] * (1.0 / minds.team.world["followed"][0] - 1.0)
+        made_up = 1.0 + team.settings["foresight"][0] * (1.0 / team.world["followed"][0] - 1.0)
         speed, omega = (old + (new - old) / made_up for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
         wish = mine["wish"] / unit_of(memory.layout.scenario)
@@ -375,7 +374,7 @@ class BeliefPlanner(DDCS):
     def _planned(self, memory: Memory) -> BoolArray:
         """Return whether each tracker plays what it planned, (E, N)."""
         beliefs = memory.beliefs
-        return np.asarray(beliefs.age.reshape(memory.minds.me.shape) * beliefs.dt <= self.plans.lost_after)
+        return np.asarray(beliefs.age.reshape(memory.me.shape) * beliefs.dt <= self.plans.lost_after)
 
     def _working(self, minds: Minds) -> BoolArray:
         """Return which trackers each one takes to work and to be in range, (R, N)."""

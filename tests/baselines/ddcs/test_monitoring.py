@@ -13,7 +13,7 @@ import posse
 from posse_baselines import begin, load
 from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
 from posse_baselines.ddcs.actuation import turn_past
-from posse_baselines.ddcs.belief import BELIEF_SIZE, LOOKS_AT, MATES_AT, SEARCH_AT, SLOT_AT, TARGET_AT, TASK_AT
+from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.laws.safeguard import DISC, put_disc
 
 
@@ -88,10 +88,13 @@ def test_without_radio_nothing_heard_has_an_effect() -> None:
 Complexes = npt.NDArray[np.complex128]
 
 
-def way(belief: npt.NDArray[np.float32], at: int, scale: float) -> Complexes:
-    """The vector (m) that stands at a place of beliefs with its length as d / (d + scale)."""
-    soft = belief[..., at] + 1j * belief[..., at + 1]
+def way(soft: Complexes, scale: float) -> Complexes:
+    """The vector (m) that stands in beliefs with its length as d / (d + scale)."""
     return np.asarray(soft * scale / (1.0 - np.abs(soft)))
+
+
+def beliefs(proposals: npt.NDArray[np.float32]) -> npt.NDArray[Any]:
+    return np.ascontiguousarray(proposals[..., 2:]).view(BELIEF)[..., 0]
 
 
 def test_the_belief_of_a_team_in_formation_is_correct() -> None:
@@ -100,28 +103,28 @@ def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     for _ in range(250):
         proposals, memory = ddcs.propose(observations, memory, believes=True)
-        belief, state = proposals[..., 2:], {k: v.copy() for k, v in batch.state.items()}
+        belief, state = beliefs(proposals), {k: v.copy() for k, v in batch.state.items()}
         actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
         observations = batch.step(actions)[0]
-    assert belief.shape == (8, 5, BELIEF_SIZE)
+    assert belief.shape == (8, 5)
     x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
     ahead = {who: state[f"{who}_heading_cos"] + 1j * state[f"{who}_heading_sin"] for who in x}
     to_target = (x["world"][:, None] - x["tracker"]) / ahead["tracker"]
-    assert (belief[..., TARGET_AT] == 1.0).all()
-    np.testing.assert_allclose(way(belief, TARGET_AT + 1, 3.0), to_target, rtol=0, atol=0.02)
-    velocity = belief[..., TARGET_AT + 3] + 1j * belief[..., TARGET_AT + 4]
+    assert (belief["known"] == 1.0).all()
+    np.testing.assert_allclose(way(belief["target"], 3.0), to_target, rtol=0, atol=0.02)
     moving = batch.scenario.target_speed * ahead["world"][:, None] / ahead["tracker"]
-    np.testing.assert_allclose(velocity, moving, rtol=0, atol=0.05)
-    np.testing.assert_array_equal(belief[..., TASK_AT : TASK_AT + 4].sum(-1), 1.0)
-    assert (belief[..., TASK_AT + FLOCKING] == 1.0).mean() > 0.9
-    flocking = belief[..., TASK_AT + FLOCKING] == 1.0
-    assert (np.abs(way(belief, SLOT_AT + 1, 0.3))[flocking] < 0.6).all()
-    assert not belief[..., SEARCH_AT : SEARCH_AT + 3].any()
-    np.testing.assert_array_equal(belief[..., MATES_AT], 1.0)
+    np.testing.assert_allclose(belief["target_velocity"], moving, rtol=0, atol=0.05)
+    np.testing.assert_array_equal(belief["task"].sum(-1), 1.0)
+    flocking = belief["task"][..., FLOCKING] == 1.0
+    assert flocking.mean() > 0.9
+    assert (np.abs(way(belief["slot_near"], 0.3))[flocking] < 0.6).all()
+    assert not belief["lost"].any()
+    assert not belief["goal"].any()
+    np.testing.assert_array_equal(belief["present"], 1.0)
     to_mates = (x["tracker"][:, None, :] - x["tracker"][:, :, None]) / ahead["tracker"][..., None]
     nearest = np.sort(np.abs(to_mates), axis=-1)[..., 1]
-    np.testing.assert_allclose(np.abs(way(belief, MATES_AT + 1, 1.0)), nearest, rtol=0, atol=0.05)
-    assert ((belief[..., LOOKS_AT:] >= 0.0) & (belief[..., LOOKS_AT:] <= 1.0)).all()
+    np.testing.assert_allclose(np.abs(way(belief["mates"][..., 0], 1.0)), nearest, rtol=0, atol=0.05)
+    assert ((belief["looks"] >= 0.0) & (belief["looks"] <= 1.0)).all()
 
 
 def test_a_searcher_has_no_estimate_of_the_target() -> None:
@@ -131,12 +134,12 @@ def test_a_searcher_has_no_estimate_of_the_target() -> None:
     lost = []
     for _ in range(20):
         proposals, memory = ddcs.propose(observations, memory, believes=True)
-        belief = proposals[..., 2:]
-        searching = belief[..., TASK_AT + SEARCHING] == 1.0
+        belief = beliefs(proposals)
+        searching = belief["task"][..., SEARCHING] == 1.0
         assert searching.any()
-        assert not belief[searching][:, TARGET_AT : TARGET_AT + 9].any()
-        assert not belief[searching][:, SLOT_AT : SLOT_AT + 7].any()
-        lost.append(belief[searching][:, SEARCH_AT].max())
+        for name in ("known", "target", "target_velocity", "frame", "frame_rate", "age", "has_slot", "slot_near"):
+            assert not belief[name][searching].any()
+        lost.append(belief["lost"][searching].max())
         actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
         observations = batch.step(actions)[0]
     np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)

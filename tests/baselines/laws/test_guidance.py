@@ -12,7 +12,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from posse_baselines.laws import formation, guidance
-from posse_baselines.laws.formation import Demand, Polar
+from posse_baselines.laws.formation import Demand
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.guidance import BODY, line_of_sight, regulate
 
@@ -197,12 +197,12 @@ OFFSET = 0.15
 @PROPERTY
 @given(st.floats(0.3, 4.0), ANGLES, ANGLES, st.floats(0.5, 2.0), ANGLES, st.floats(0.0, 1.0), st.floats(-1.0, 1.0))
 def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
-    l_now: float, phi: float, gamma: float, l_d: float, phi_d: float, leader_speed: float, leader_omega: float
+    l_now: float, phi: float, turned: float, l_d: float, phi_d: float, leader_speed: float, leader_omega: float
 ) -> None:
     assume(abs(short_way(phi_d - phi)) < math.pi - 1e-6)  # at half a turn either way is right
-    demand = formation.l_phi_demand(Polar(l_now, phi), Polar(l_d, phi_d), leader_speed, leader_omega, 2.0, 1.5)
-    point = formation.point_velocity(Demand(l_now, demand, gamma))  # in the follower's own axes
-    along = point * cmath.exp(-1j * gamma)  # along l, and across it
+    now, wanted = cmath.rect(l_now, phi), cmath.rect(l_d, phi_d)
+    demand = formation.l_phi_demand(now, wanted, turned, leader_speed, leader_omega, 2.0, 1.5)
+    along = demand.velocity * cmath.exp(-1j * (phi + turned))  # along l, and across it
     leader = cmath.rect(leader_speed, -phi)
     assert along.real - leader.real == pytest.approx(2.0 * (l_d - l_now), abs=1e-9)
     phi_rate = (along.imag - leader.imag) / l_now - leader_omega
@@ -255,9 +255,11 @@ def test_limits_hold_and_reversing_becomes_a_turn(speed: float, omega: float) ->
 @pytest.mark.parametrize("crossing", [0.1, 0.2, 1.5, 2.9, -0.1, -0.2, -1.5, -2.9])
 def test_l_l_asks_for_both_rates_where_the_lines_cross_on_the_wanted_side(crossing: float, wanted: float) -> None:
     gamma_i, gamma_k = 0.4, 0.4 + crossing
-    found = formation.l_l_velocity(Demand(1.0, 0.3 + 0.7j, gamma_i), Demand(2.0, -0.5 + 0.2j, gamma_k), wanted, 0.15)
+    i = Demand(1.0, gamma_i, (0.3 + 0.7j) * cmath.exp(1j * gamma_i))
+    k = Demand(2.0, gamma_k, (-0.5 + 0.2j) * cmath.exp(1j * gamma_k))
+    found = formation.l_l_velocity(i, k, wanted, 0.15)
     rates = [(found * cmath.exp(-1j * gamma)).real for gamma in (gamma_i, gamma_k)]
     if math.copysign(1.0, wanted) * math.sin(crossing) < 0.15:  # l-φ on the nearer leader
-        assert found == pytest.approx((0.3 + 0.7j) * cmath.exp(1j * gamma_i))
+        assert found == pytest.approx(i.velocity)
     else:
         assert rates == pytest.approx((0.3, -0.5))

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from posse import get_scenario
+from posse_baselines.ddcs.memory import constants_of
 from posse_baselines.laws.guidance import BODY, regulate
-from posse_baselines.laws.offsets import constants_of
-from posse_baselines.laws.safeguard import DISC, PLAYS, put_disc, put_walls, safe_velocity
+from posse_baselines.laws.safeguard import DISC, put_disc, put_walls, safe_velocity
 
 DT = 0.1
-WORK = np.zeros(1, PLAYS)[0]
 Disc = tuple[complex, complex, float, float]
 """Place, velocity, reach, margin."""
 LIMITS = pytest.mark.parametrize("limits", [(1e4, 1e4), (1.0, 4.0)])  # acceleration, turn acceleration
@@ -33,7 +32,7 @@ def safe(body: Any, wanted: complex, *discs: Disc) -> tuple[complex, bool]:
     found, count = np.zeros(8, DISC), 0
     for disc in discs:
         count = put_disc(found, count, *disc)
-    return safe_velocity(body, found[:count], wanted, WORK)
+    return safe_velocity(body, found[:count], wanted)
 
 
 def drive(body: Any, place: complex, wanted: complex) -> complex:
@@ -100,7 +99,7 @@ def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> No
     room = constants_of(get_scenario("search", arena=(6.0, 12.0)))[0]
     for _ in range(80):
         count = put_walls(discs, 0, room, place, 0.15, 0.15)
-        velocity, _ = safe_velocity(body, discs[:count], 1 + 0j, WORK)
+        velocity, _ = safe_velocity(body, discs[:count], 1 + 0j)
         place = drive(body, place, velocity)
         nearest = min(nearest, 3.0 - 0.15 - place.real)
     assert 0.0 < nearest < 0.6

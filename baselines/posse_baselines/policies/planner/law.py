@@ -16,11 +16,10 @@ from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
 from posse_baselines.ddcs.memory import UNLIMITED, Work, work_for
-from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
 from posse_baselines.laws.guidance import BODY, regulate, write_motion
-from posse_baselines.laws.safeguard import NEAR, put_disc, put_walls, safe_velocity
-from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
+from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
+from posse_baselines.laws.steering import Course, approach_velocity, assign, meeting_velocity, time_to_slot, way_round
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
@@ -163,8 +162,8 @@ def arrival_time(scene: Scene, i: int, slot: complex) -> float:
 @compiled
 def assign_slots(scene: Scene, work: Work) -> None:
     """Assign the working trackers to slots with the least total arrival time."""
-    w, plans, rows = scene.world, scene.plans, 0
-    n = scene.config.num_trackers
+    w, plans, n = scene.world, scene.plans, scene.config.num_trackers
+    work.cost[:] = 0.0
     for i in range(n):
         t = scene.trackers[i]
         if t.broken_at != NEVER:
@@ -181,14 +180,11 @@ def assign_slots(scene: Scene, work: Work) -> None:
             time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
-            work.cost[rows, k] = time
-        rows += 1
-    assign(work.cost, rows, n, work.assigning)
-    rows = 0
+            work.cost[i, k] = time
+    assign(work.cost, work.assigning)
     for i in range(n):
         if scene.trackers[i].broken_at == NEVER:
-            plans[i].slot = int(work.assigning[0, rows])
-            rows += 1
+            plans[i].slot = int(work.assigning[0, i])
 
 
 @compiled
@@ -197,13 +193,12 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
     c, w, t = scene.config, scene.world, scene.trackers[i]
     count, two = 0, 2.0 * c.robot_radius
     way = complex(w.x, w.y) - complex(t.x, t.y)
-    if dot(way, way) < NEAR * NEAR:
-        count = put_disc(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
+    count = put_near(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
         other = scene.trackers[j]
         way = complex(other.x, other.y) - complex(t.x, t.y)
-        if j != i and dot(way, way) < NEAR * NEAR:
-            count = put_disc(discs, count, way, velocity_of(other), two, _MARGIN)
+        if j != i:
+            count = put_near(discs, count, way, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
         disc = scene.obstacles[k]
         way, reach = complex(disc.x, disc.y) - complex(t.x, t.y), disc.radius + c.robot_radius
@@ -265,7 +260,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         read_motion(c, t, me)
         velocity = wanted_velocity(scene, i, me.acceleration)
         discs = work.discs[: surround(scene, i, work.discs)]
-        me.wish, _ = safe_velocity(me, discs, velocity, work.plays)
+        me.wish, _ = safe_velocity(me, discs, velocity)
         v, omega = regulate(me, me.wish, 0.0)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
@@ -279,7 +274,7 @@ def drive_all(
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
     w = teams.work
-    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.plays[thread])
+    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
     copies = len(going) // len(teams.begun)
     for e in range(first, end):
         if going[e]:
