@@ -22,12 +22,13 @@ from posse_baselines import load
 from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.errors import PlayError
+from posse_training.evaluation import evaluation
 from posse_training.parallel import WORK
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
 EPISODES = 45
 SHARDS = 9
-THERE: dict[str, Any] = {"ray": True, "worlds": EPISODES // SHARDS, **SHORT}
+THERE: dict[str, Any] = {"ray": True, **SHORT}
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,7 @@ def nodes() -> Iterator[Cluster]:
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(evaluation, "WORLDS", EPISODES // SHARDS)
     return tmp_path
 
 
@@ -75,8 +77,9 @@ def test_a_worker_that_dies_costs_its_shard(nodes: Cluster, local: Results, fold
 def test_a_killed_driver_resumes(nodes: Cluster, local: Results, folder: Path) -> None:
     """The shard that waits is lost with its driver; those that were done are not played again."""
     code = (
-        "from pathlib import Path\nfrom posse_training import evaluate\n"
+        "from pathlib import Path\nfrom posse_training.evaluation import evaluate, evaluation\n"
         "from tests.support.bad_policies import Watched\n"
+        f"evaluation.WORLDS = {EPISODES // SHARDS}\n"
         f"policy = Watched(Path({str(folder)!r}), 'wait')\n"
         f"evaluate(policy, 'smart', {EPISODES}, **{ {**THERE, 'ray': nodes.address}!r})\n"
     )
