@@ -5,17 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.support.user_modules import examples, lines_of, run
+from tests.support.user_modules import examples, run
 
 EXAMPLES = examples("extend.md")
-MOST_LINES = {"walls": 8, "closing": 12, "steady": 6, "spiral": 15, "bearing": 25, "distance": 8}
-
-
-@pytest.mark.parametrize("name", MOST_LINES)
-def test_the_examples_of_extend_are_short(name: str) -> None:
-    assert lines_of(EXAMPLES[name]) <= MOST_LINES[name]
-
-
 TWICE = """
 import posse
 from posse.numeric import choose
@@ -197,16 +189,3 @@ print("done")
 def test_a_motion_a_sensor_and_a_metric_are_part_of_the_kernel(tmp_path: Path) -> None:
     done = run(tmp_path, MOTION_SENSOR_AND_METRIC, **EXAMPLES)
     assert done.stdout.endswith("done\n"), done.stderr
-
-
-UNKNOWN = {
-    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'",
-    "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
-    "target_motion='spirall'": "unknown target_motion 'spirall' (did you mean 'spiral'?)",
-}
-
-
-@pytest.mark.parametrize("settings", UNKNOWN)
-def test_a_setting_that_names_nothing_is_refused(settings: str, tmp_path: Path) -> None:
-    code = f"import posse, spiral, steady, walls\nposse.batch('obstacles', {settings})"
-    assert UNKNOWN[settings] in run(tmp_path, code, **EXAMPLES).stderr

@@ -6,7 +6,7 @@ import re
 import subprocess
 from pathlib import Path
 
-from tests.support.forks import forks_of
+from tests.support.process import python
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -21,9 +21,4 @@ def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[
     """Run code with a user's modules in a new process."""
     for name, source in {**modules, "main": code}.items():
         (folder / f"{name}.py").write_text(source, encoding="utf-8")
-    return forks_of("posse").run(code, folder, file=str(folder / "main.py"))
-
-
-def lines_of(source: str) -> int:
-    """Return the number of lines with code or docstrings."""
-    return sum(bool(line.strip()) for line in source.splitlines())
+    return python("main.py", cwd=folder)
