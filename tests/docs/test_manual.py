@@ -15,12 +15,11 @@ from pathlib import Path
 
 import pytest
 from tests.support.browser import Tags
-from tests.support.pages import FENCE, PAGES, ROOT
+from tests.support.pages import ROOT
 
 import posse
 
 DOCS = ROOT / "docs"
-COLUMNS = 72
 MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay", "posse_training.leaderboard")
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 
@@ -65,13 +64,6 @@ def test_the_manual_is_short() -> None:
     texts = [path.read_text(encoding="utf-8") for path in (*pages, ROOT / "CONTRIBUTING.md")]
     assert len(pages) <= 25
     assert sum(len(re.findall(r"\S*\w\S*", text)) for text in texts) <= 15_000
-
-
-@pytest.mark.parametrize("page", sorted(PAGES))
-def test_its_code_has_72_columns(page: str) -> None:
-    listed = [ROOT / name for name in re.findall(r'--8<-- "(.+\.py)"', PAGES[page])]
-    texts = [text for _, _, text in FENCE.findall(PAGES[page])] + [path.read_text(encoding="utf-8") for path in listed]
-    assert [line for text in texts for line in text.splitlines() if len(line) > COLUMNS] == []
 
 
 def test_it_is_built_without_a_warning(site: Path) -> None:

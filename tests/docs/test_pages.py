@@ -151,18 +151,6 @@ def test_other_splits_versions_and_few_worlds_are_not_listed(
     assert lines(hooks[0].leaderboard(), "smart") == []
 
 
-def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(
-    hooks: tuple[ModuleType, ModuleType], tmp_path: Path
-) -> None:
-    put(tmp_path, {"label": "LABEL"})
-    path = tmp_path / "standings.csv"
-    hostile = "![p](https://x.invalid/p){: onerror=alert(1) }"
-    path.write_text(path.read_text(encoding="utf-8").replace("LABEL", hostile), encoding="utf-8")
-    for made in (hooks[0].leaderboard, hooks[0].results):
-        with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be at most 100 letters"):
-            made()
-
-
 def test_at_most_eight_replays_each_in_the_gallery(hooks: tuple[ModuleType, ModuleType]) -> None:
     replays, text = hooks[1].REPLAYS, (DOCS / "scenarios.md").read_text(encoding="utf-8")
     assert len(replays) <= 8

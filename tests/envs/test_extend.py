@@ -18,14 +18,6 @@ def twice(c, v):
     \"\"\"Whether it moves, and the team's size.\"\"\"
     return choose(v.speed > 0.0, 1.0, -1.0), c.num_trackers
 
-
-@posse.field("1", low=0, high=40, size=20)
-def told(c):
-    \"\"\"Many settings.\"\"\"
-    return (
-        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0,
-        11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, c.num_trackers, 20.0,
-    )
 """
 FIELDS_AND_TERMS = """
 import pickle
@@ -39,7 +31,7 @@ import twice
 import walls
 
 settings = dict(
-    extra_fields=("closing_speed", "wall_distance", "twice", "told"),
+    extra_fields=("closing_speed", "wall_distance", "twice"),
     target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
     num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
@@ -48,12 +40,6 @@ settings = dict(
 batch = posse.batch("obstacles", 11, **settings)
 s, layout = batch.scenario, batch.layout
 plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": (), "reward_weights": {}})
-names = [field.name for field in layout.fields]
-assert [name for name in names if name not in {f.name for f in plain.layout.fields}] == [
-    "wall_distance", "twice", "told", "closing_speed"
-]
-assert names.index("told") + 1 == names.index("sonar")
-assert names.index("closing_speed") + 1 == names.index("neighbour_message")
 low, high = layout.bounds()
 rng = np.random.default_rng(0)
 observed, expected = batch.reset(seed=1), plain.reset(seed=1)
@@ -61,7 +47,6 @@ for step in range(60):
     o, other = layout.views(observed), plain.layout.views(expected)
     for name, view in other.items():
         np.testing.assert_array_equal(o[name], view, err_msg=name)
-    assert (o["told"] == [*range(1, 19), 4, 20]).all()
     assert ((observed >= low) & (observed <= high)).all()
     state = batch.state
     x, y, heading, side, speed = (

@@ -8,7 +8,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 from tests.support.adapters import play_both
 
 from posse.adapters.vector_env import TeamVectorEnv
@@ -57,20 +56,6 @@ def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
     env = vector(autoreset=mode.name.lower())
     assert env.autoreset_mode is env.metadata["autoreset_mode"] is mode
     assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-
-
-@names
-def test_gymnasiums_wrappers_take_it(name: str) -> None:
-    env = NormalizeObservation(RecordEpisodeStatistics(vector(name, horizon=5, settle_time=0.3)))
-    observations, _ = env.reset(seed=0)
-    total = np.zeros(E)
-    for _ in range(5):
-        observations, rewards, _, _, infos = env.step(env.action_space.sample())
-        total += rewards
-    assert observations.shape == env.observation_space.shape
-    assert np.isfinite(observations).all()
-    assert infos["episode"]["l"].tolist() == [5] * E
-    assert infos["episode"]["r"] == pytest.approx(total)
 
 
 def test_every_world_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -201,7 +201,7 @@ def test_bad_options_change_nothing(options: dict[str, Any], word: str) -> None:
     assert subject.batch.seed == 9
 
 
-def test_a_robot_starts_outside_obstacles_and_may_start_beside_a_wall() -> None:
+def test_a_robot_starts_outside_obstacles() -> None:
     batch = posse.batch("obstacles", 1, seed=3)
     batch.reset()
     obstacle = batch.arrays.obstacle[0, 0]
@@ -209,8 +209,6 @@ def test_a_robot_starts_outside_obstacles_and_may_start_beside_a_wall() -> None:
     poses[2, :2] = obstacle["x"], obstacle["y"]
     with pytest.raises(ValueError, match=r"tracker_2 of world 0 would start in"):
         batch.reset(seed=3, options={"tracker_pose": poses})
-    along = {"tracker_pose": [[0.0, 0.0, 0.0]], "target_pose": [9.5, 1.0, np.pi / 2]}
-    posse.batch("search", 1, num_trackers=1, start_distance=(2.0, 4.0)).reset(options=along)
 
 
 def test_a_mask_that_chooses_no_world_starts_none() -> None:

@@ -93,8 +93,8 @@ def write(folder: Path) -> None:
 
 def play(folder: Path, cache: Path) -> tuple[list[str], str]:
     """Run main.py in a new process, as ``__main__`` without a file; return what it prints, and the errors."""
-    variables = {"POSSE_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = python("-W", "error", "-c", (folder / "main.py").read_text(), cwd=folder, **variables)
+    command = ("-B", "-W", "error", "-c", (folder / "main.py").read_text())
+    done = python(*command, cwd=folder, POSSE_CACHE_DIR=str(cache))
     assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr
 

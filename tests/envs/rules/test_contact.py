@@ -80,24 +80,3 @@ def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
         free = min(step, away + 0.3 - math.sqrt(reach**2 - miss**2))
     assert along == pytest.approx(free, abs=2e-3 if abs(abs(miss) - reach) < 1e-3 else 2e-4)
     assert abs(place) > 0.3
-
-
-@pytest.mark.parametrize("speed", [1.0, 40.0])
-def test_walls_hold(speed: float) -> None:
-    batch = posse.batch(num_trackers=4, arena=10.0, tracker_speed=speed, start_distance=(1.0, 5.0))
-    at(
-        batch,
-        [0.0, 0.0, 1.0],
-        [4.0, 1.0, 0.0],
-        [-4.0, 1.0, math.pi],
-        [1.0, 4.0, math.pi / 2],
-        [1.0, -4.0, -math.pi / 2],
-    )
-    for _ in range(30):
-        infos = act(batch, *[[1.0, 0.0]] * 4)
-    state = one_world(snapshot(batch), 0)
-    reached = np.max(np.abs([state["tracker_x"], state["tracker_y"]]), axis=0)
-    np.testing.assert_allclose(reached, 10 / 2 - 0.15, atol=0.001)
-    assert (reached < 4.85).all()
-    assert state["world_contacts_obstacle"] == 4, "once each, though all kept pushing"
-    assert (infos["reward/contact"] == 0).all()
