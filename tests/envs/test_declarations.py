@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from tests.support.user_modules import examples, run
+from tests.support.process import examples, run
 
 FIELD = '@posse.field({})\ndef own({}):\n    """Own."""\n    return {}\nposse.batch(extra_fields=["own"]).reset()'
 TERM = '@posse.reward_term("1")\ndef own({}):\n    """Own."""\n    {}\nposse.batch(reward_weights={{"own": 1}})'

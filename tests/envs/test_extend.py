@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.support.user_modules import examples, run
+from tests.support.process import examples, run
 
 EXAMPLES = examples("extend.md")
 TWICE = """
@@ -22,7 +22,6 @@ def twice(c, v):
 FIELDS_AND_TERMS = """
 import pickle
 
-import gymnasium
 import numpy as np
 import posse
 import closing
@@ -76,11 +75,6 @@ for step in range(60):
 copy = pickle.loads(pickle.dumps(batch))
 np.testing.assert_array_equal(copy.step(actions)[0], batch.step(actions)[0])
 assert "steady" not in posse.batch("smart").term_names
-
-own = {name: settings[name] for name in ("extra_fields", "reward_weights")}  # the same kernel
-team = gymnasium.make("posse/Team-v0", scenario="obstacles", **own)
-team.reset(seed=0)
-assert team.step(team.action_space.sample())[4]["reward/steady"].shape == (5,)
 print("done")
 """
 

@@ -66,13 +66,14 @@ def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kin
 
 @pytest.mark.parametrize("kind", ["parallel", "team", "solo"])
 def test_an_environment_is_the_first_world_of_a_batch(kind: str) -> None:
-    subject, batch = (Subject(each, split="test", first_world=5, horizon=40) for each in (kind, "batch"))
-    seen, rows, rng = env.reset(seed=9)[0], batch.reset(seed=9), np.random.default_rng(0)
+    settings: dict[str, Any] = {"split": "test", "first_world": 5, "horizon": 40, "num_trackers": 1 + (kind != "solo")}
+    subject, batch = Subject(kind, **settings), MAKERS["batch"](**settings)
+    seen, rows, rng = subject.env.reset(seed=9)[0], batch.reset(seed=9), np.random.default_rng(0)
     for _ in range(30):
         mine = list(seen.values()) if kind == "parallel" else np.reshape(seen, rows[0].shape)
         np.testing.assert_array_equal(mine, rows[0])
         drawn = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-        seen, reward, *_, info = env.step(actions(drawn[0]))
+        seen, reward, *_, info = subject.env.step(subject.action(drawn))
         rows, rewards, *_, told = batch.step(drawn)
         if kind == "parallel":
             assert list(reward.values()) == rewards[0].tolist()

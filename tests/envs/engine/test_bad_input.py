@@ -80,47 +80,39 @@ def test_the_first_bad_action_is_named_wherever_it_stands(number: int, value: fl
         batch.step(actions)
 
 
-BAD_ACTIONS: list[tuple[Any, str]] = [
-    (f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
-    (f32([np.inf, 0]), r"tracker_3: speed = inf"),
-    ([0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
-    (f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
-    (f32([[0, 0]]), r"tracker_3 has shape \(1, 2\), wanted \(2,\)"),
-    (["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
-    (None, r"tracker_3 must be real numbers, got None"),
-    ([[0], [0, 1]], r"tracker_3 is not an array"),
+BAD_ACTIONS: list[tuple[bool, Any, str]] = [
+    (False, f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
+    (False, f32([np.inf, 0]), r"tracker_3: speed = inf"),
+    (False, [0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
+    (False, f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
+    (False, f32([[0, 0]]), r"tracker_3 has shape \(1, 2\), wanted \(2,\)"),
+    (False, ["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
+    (False, None, r"tracker_3 must be real numbers, got None"),
+    (False, [[0], [0, 1]], r"tracker_3 is not an array"),
+    (True, 15, r"tracker_3 is 15, outside 0 to 14"),
+    (True, 1.0, r"tracker_3 must be whole numbers, got 1\.0"),
+    (True, [3], r"tracker_3 has shape \(1,\), wanted \(\)"),
 ]
 
 
-@pytest.mark.parametrize(("action", "message"), BAD_ACTIONS)
-def test_a_bad_action_names_its_agent(action: Any, message: str) -> None:
-    env = posse.parallel_env()
+@pytest.mark.parametrize(("discrete", "action", "message"), BAD_ACTIONS)
+def test_a_bad_action_names_its_agent(discrete: bool, action: Any, message: str) -> None:
+    env = posse.parallel_env(discrete_actions=discrete)
     env.reset(seed=0)
-    before, good = env.state(), dict.fromkeys(env.agents, f32([0, 0]))
-    with pytest.raises(ValueError, match=message):
-        env.step({**good, "tracker_3": action})
-    assert np.array_equal(env.state(), before)
+    before, good = env.state(), dict.fromkeys(env.agents, 2 if discrete else f32([0, 0]))
     without = {agent: good[agent] for agent in good if agent != "tracker_2"}
-    with pytest.raises(ValueError, match=r"no action for tracker_2.*agents are: tracker_0,"):
-        env.step(without)
-    with pytest.raises(ValueError, match=r"unknown agent 'tracker_9'"):
-        env.step({**without, "tracker_9": f32([0, 0])})
+    for actions, words in (
+        ({**good, "tracker_3": action}, message),
+        (without, r"no action for tracker_2.*agents are: tracker_0,"),
+        ({**without, "tracker_9": good["tracker_0"]}, r"unknown agent 'tracker_9'"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            env.step(actions)
+        assert np.array_equal(env.state(), before)
     env.step(good)
 
 
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (15, r"tracker_3 is 15, outside 0 to 14"),
-        (1.0, r"tracker_3 must be whole numbers, got 1\.0"),
-        ([3], r"tracker_3 has shape \(1,\), wanted \(\)"),
-    ],
-)
-def test_a_bad_discrete_action_names_its_agent(action: Any, message: str) -> None:
-    env = posse.parallel_env(discrete_actions=True)
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=message):
-        env.step({**dict.fromkeys(env.agents, 2), "tracker_3": action})
+def test_a_bad_discrete_action_of_a_vector_is_named() -> None:
     vector = gymnasium.make_vec("posse/Team-v0", 3, discrete_actions=True)
     vector.reset(seed=0)
     with pytest.raises(ValueError, match=r"actions\[1, 2\] is 15, outside 0 to 14"):
