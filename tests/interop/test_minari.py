@@ -12,7 +12,6 @@ import gymnasium
 import minari
 import numpy as np
 import pytest
-from minari.data_collector.data_collector import _check_infos_same_shape
 from tests.support.adapters import part
 
 import posse
@@ -53,11 +52,6 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
 
 
-def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
-    data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
-    assert [episode.id for episode in data] == list(range(5))
-
-
 def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
     def killed(episodes: int) -> None:
         os._exit(9)
@@ -72,14 +66,6 @@ def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         load_dataset(tmp_path, "posse/constant/idle-v0")
     assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
-
-
-def test_minaris_own_collector_records_every_kind_of_info() -> None:
-    for name in ("posse/Team-v0", "posse/Solo-v0"):
-        env = gymnasium.make(name, **SHORT)
-        _, info = env.reset(seed=1)
-        following = env.step(env.action_space.sample())[-1]
-        assert _check_infos_same_shape(info, following)
 
 
 def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:

@@ -22,8 +22,7 @@ LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
     recipe = RECIPES / f"{name}.py"
-    variables = {"SDL_VIDEODRIVER": "dummy"}
-    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300, **variables)
+    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300)
 
 
 def names() -> list[str]:

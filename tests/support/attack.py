@@ -9,7 +9,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import VectorEnv
+from tests.support.adapters import same
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
@@ -99,6 +102,15 @@ class Subject:
             for value in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
                 yield {**good, "tracker_1": value}
                 yield {**good, LONG_NAME: value}
+
+    def refused(self, call: Any) -> str:
+        """Return the message of a refused call, after checking that it changed nothing."""
+        before = self.held()
+        with pytest.raises((ValueError, ResetNeeded)) as caught:
+            call()
+        assert same(before, self.held())
+        assert 0 < len(str(caught.value)) <= 1000
+        return str(caught.value)
 
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""

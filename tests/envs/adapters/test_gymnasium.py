@@ -19,11 +19,6 @@ from posse.adapters.pettingzoo_env import TeamParallelEnv
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 
 
-@pytest.fixture(autouse=True)
-def _no_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-
-
 @pytest.mark.parametrize("name", [TEAM, SOLO])
 def test_gymnasium_finds_the_drawing_sound(name: str) -> None:
     check_env(gymnasium.make(name, scenario="smart").unwrapped)
