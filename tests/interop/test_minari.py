@@ -52,6 +52,11 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
 
 
+def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
+    data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
+    assert [episode.id for episode in data] == list(range(5))
+
+
 def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
     def killed(episodes: int) -> None:
         os._exit(9)
