@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from operator import attrgetter
 from typing import Any
@@ -12,7 +11,6 @@ import numpy.typing as npt
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.support.adapters import part
 from tests.support.reference.motion import free_gaps, free_motion, path_gaps
 from tests.support.reference.observation import observation
 from tests.support.reference.score import Episode, slots
@@ -187,38 +185,9 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
 """Every scenario, and variants of settings."""
 
 
-@functools.cache
-def started(case: int) -> tuple[posse.Batch, npt.NDArray[np.float32]]:
-    """Start an episode that is short, and from starts nearby, so that much happens."""
-    name, changes = CASES[case]
+@pytest.mark.parametrize(("name", "changes"), CASES, ids=str)
+def test_a_team_that_forms_up_goes_as_an_independent_computation_says(name: str, changes: dict[str, Any]) -> None:
+    """In short episodes, and from starts nearby, so that much happens."""
     short: dict[str, Any] = {"horizon": 160, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0}
     batch = posse.batch(name, 1, seed=8, **short, **changes)
-    return batch, batch.reset(seed=8)
-
-
-@pytest.mark.parametrize("case", range(len(CASES)), ids=lambda case: f"{CASES[case]}")
-def test_a_team_that_forms_up_goes_as_an_independent_computation_says(case: int) -> None:
-    batch, observations = started(case)
-    judge(batch, observations, 0, "forms", every=6 if batch.scenario.num_trackers < 12 else 24)
-
-
-def test_the_random_worlds_exercise_every_rule_compared() -> None:
-    seen: dict[str, list[float]] = {}
-    for case in range(len(CASES)):
-        (batch, _), rng = started(case), np.random.default_rng(0)
-        batch.reset(seed=8)
-        for _ in range(160):
-            infos = batch.step(chosen(batch, one_world(snapshot(batch), 0), rng, "forms"))[-1]
-        for name, value in part(infos, "metrics/").items():
-            seen.setdefault(name, []).append(float(value[0]))
-    for name in ("settling_time", "recovery_time"):
-        assert any(map(math.isfinite, seen[name])), name
-        assert any(map(math.isnan, seen[name])), name
-    for name in ("tracker_contacts", "obstacle_contacts", "target_contacts"):
-        assert max(seen[name]) > 0, name
-    for name in ("time_in_sight", "time_connected", "score", "bound", "contact_free"):
-        assert max(seen[name]) > 0, name
-        assert min(seen[name]) < 1, name
-    pairs = list(zip(seen["safe_score"], seen["score"], strict=True))
-    assert any(0 < safe < score for safe, score in pairs), "contact in mid-episode"
-    assert any(0 < safe == score for safe, score in pairs), "no contact"
+    judge(batch, batch.reset(), 0, "forms", every=6 if batch.scenario.num_trackers < 12 else 24)

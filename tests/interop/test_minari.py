@@ -12,7 +12,6 @@ import gymnasium
 import minari
 import numpy as np
 import pytest
-from minari.data_collector.data_collector import _check_infos_same_shape
 from tests.support.adapters import part
 
 import posse
@@ -75,14 +74,6 @@ def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path, monkeypat
     assert process.exitcode == 9
     assert [path for path in tmp_path.rglob("*.hdf5") if ".recording-" not in str(path)] == []
     assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
-
-
-def test_minaris_own_collector_records_every_kind_of_info() -> None:
-    for name in ("posse/Team-v0", "posse/Solo-v0"):
-        env = gymnasium.make(name, **SHORT)
-        _, info = env.reset(seed=1)
-        following = env.step(env.action_space.sample())[-1]
-        assert _check_infos_same_shape(info, following)
 
 
 def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:

@@ -18,14 +18,11 @@ OWN_ENVIRONMENT = dict.fromkeys(
 LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", "torchrl_batch", "torchrl_gym"}
 LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
-LONGEST = 24
-LONGER = {"robotarium": 70}
 
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
     recipe = RECIPES / f"{name}.py"
-    variables = {"SDL_VIDEODRIVER": "dummy"}
-    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300, **variables)
+    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300)
 
 
 def names() -> list[str]:
@@ -67,8 +64,6 @@ def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", names())
-def test_a_recipe_is_short_and_on_the_page(name: str) -> None:
-    lines = (RECIPES / f"{name}.py").read_text(encoding="utf-8").splitlines()
-    assert len([line for line in lines if line.strip()]) <= LONGER.get(name, LONGEST)
+def test_a_recipe_is_on_a_page(name: str) -> None:
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))
     assert f'--8<-- "docs/recipes/{name}.py"' in pages

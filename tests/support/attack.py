@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
+import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import VectorEnv
+from tests.support.adapters import same
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
@@ -16,8 +21,19 @@ SHORT: dict[str, Any] = {"num_trackers": 2, "horizon": 4, "settle_time": 0.1}
 LONG_NAME = "x" * 5000
 
 
-def _vector(name: str) -> VectorEnv[Any, Any, Any]:
-    return gymnasium.make_vec(name, 2, **{**SHORT, "num_trackers": 1 + (name == TEAM)})
+TEAM, SOLO, TRACKER = "posse/Team-v0", "posse/Solo-v0", "posse/Tracker-v0"
+
+
+def _batch(**settings: Any) -> posse.Batch:
+    return posse.batch(**{"scenario": "constant", "num_worlds": 2, **SHORT, **settings})
+
+
+def _single(name: str, **settings: Any) -> Any:
+    return gymnasium.make(name, disable_env_checker=True, **{**SHORT, **settings}).unwrapped
+
+
+def _vector(name: str, **settings: Any) -> VectorEnv[Any, Any, Any]:
+    return gymnasium.make_vec(name, **{"num_envs": 2, **SHORT, **settings})
 
 
 def _torchrl() -> Any:
@@ -26,15 +42,14 @@ def _torchrl() -> Any:
     return PosseEnv("constant", 2, **SHORT)
 
 
-TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
-MAKERS: dict[str, Callable[[], Any]] = {
-    "batch": lambda: posse.batch("constant", 2, **SHORT),
-    "parallel": lambda: posse.parallel_env(**SHORT),
-    "team": lambda: gymnasium.make(TEAM, disable_env_checker=True, **SHORT).unwrapped,
-    "solo": lambda: gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped,
-    "tracker": lambda: gymnasium.make("posse/Tracker-v0", disable_env_checker=True, **SHORT).unwrapped,
-    "team vector": lambda: _vector(TEAM),
-    "solo vector": lambda: _vector(SOLO),
+MAKERS: dict[str, Callable[..., Any]] = {
+    "batch": _batch,
+    "parallel": lambda **settings: posse.parallel_env(**{**SHORT, **settings}),
+    "team": functools.partial(_single, TEAM),
+    "solo": functools.partial(_single, SOLO, num_trackers=1),
+    "tracker": functools.partial(_single, TRACKER),
+    "team vector": functools.partial(_vector, TEAM),
+    "solo vector": functools.partial(_vector, SOLO, num_trackers=1),
     "torchrl": _torchrl,
 }
 
@@ -47,16 +62,17 @@ class Subject:
         batch: The batch that it stands on.
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, **settings: Any) -> None:
         self.kind = kind
-        self.env = inner = MAKERS[kind]()
+        self.env = inner = MAKERS[kind](**settings)
         self.batch: posse.Batch = inner if kind == "batch" else inner.batch
 
     def good_action(self, rng: np.random.Generator) -> Any:
         """Return a valid action."""
-        scenario = self.batch.scenario
-        drawn = rng.uniform(-1, 1, (self.batch.num_worlds, scenario.num_trackers, 2))
-        actions = drawn.astype(np.float32)
+        return self.action(rng.uniform(-1, 1, self.batch.action_shape).astype(np.float32))
+
+    def action(self, actions: npt.NDArray[np.float32]) -> Any:
+        """Return a batch's actions (E, N, 2) as this kind of environment takes them."""
         if self.kind == "parallel":
             return {f"tracker_{i}": row for i, row in enumerate(actions[0])}
         if self.kind == "torchrl":
@@ -86,6 +102,15 @@ class Subject:
             for value in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
                 yield {**good, "tracker_1": value}
                 yield {**good, LONG_NAME: value}
+
+    def refused(self, call: Any) -> str:
+        """Return the message of a refused call, after checking that it changed nothing."""
+        before = self.held()
+        with pytest.raises((ValueError, ResetNeeded)) as caught:
+            call()
+        assert same(before, self.held())
+        assert 0 < len(str(caught.value)) <= 1000
+        return str(caught.value)
 
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""

@@ -47,7 +47,6 @@ def opened(
     *,
     size: tuple[int, int] = (1200, 800),
     dark: bool = False,
-    touch: bool = False,
     still: bool = False,
 ) -> Iterator[Page]:
     """Open a file; fail if it makes a request or writes to the console. ``still``: the user wants no motion."""
@@ -55,8 +54,6 @@ def opened(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if dark else "light",
         reduced_motion="reduce" if still else "no-preference",
-        has_touch=touch,
-        is_mobile=touch,
         device_scale_factor=1,
     )
     heard: list[str] = []

@@ -57,7 +57,6 @@ def drive(
     tracker_pose: Any = None,
     target_pose: Any = None,
     target: Callable[[float], tuple[float, float]] | None = None,
-    seed: int = 0,
     **settings: Any,
 ) -> Iterator[Instant]:
     """Play ``steps`` control steps; ``target`` gives its (V, ω) where a test steers it."""
@@ -65,7 +64,7 @@ def drive(
     if target is not None:
         settings["target_motion"] = "agent"
     settings = {"message_size": team.message_size, "horizon": steps + 1000, **settings}
-    batch = posse.batch(scenario, worlds, seed=seed, autoreset="disabled", **settings)
+    batch = posse.batch(scenario, worlds, seed=0, autoreset="disabled", **settings)
     options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
     observations = batch.reset(options={k: v for k, v in options.items() if v is not None})
     memory, s = begin(team, batch), batch.scenario

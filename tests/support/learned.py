@@ -37,9 +37,9 @@ def policy_for(layout: posse.ObservationLayout, kind: str = "slots", **changes: 
     return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 
 
-def any_policy(scenario: str = "smart") -> LearnedPolicy:
-    """A policy of the name "mine" for a scenario."""
-    return policy_for(posse.ObservationLayout(posse.get_scenario(scenario)))
+def any_policy() -> LearnedPolicy:
+    """A policy of the name "mine"."""
+    return policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
 
 
 def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides: Any) -> Any:
@@ -51,8 +51,7 @@ def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides:
     return batch, observations
 
 
-def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0) -> LearnedPolicy:
+def target_for(scenario: posse.Scenario) -> LearnedPolicy:
     """A policy of arbitrary weights that moves the target."""
     encoding = Encoding.of(posse.ObservationLayout(scenario.replace(message_size=0)), "plain")
-    card = {"name": name, "side": "target"}
-    return LearnedPolicy(network_for(encoding.size, seed=seed), encoding, card)
+    return LearnedPolicy(network_for(encoding.size), encoding, {"name": "evading", "side": "target"})

@@ -1,8 +1,9 @@
-"""Python in a process of its own, which imports all packages from this tree."""
+"""Python in a process of its own, which imports all packages from this tree; users' modules, run there."""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -30,3 +31,16 @@ def printed(*words: str | Path, **settings: Any) -> str:
     done = python(*words, **settings)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
     return done.stdout
+
+
+def examples(chapter: str) -> dict[str, str]:
+    """Return the modules of a chapter of the manual by name."""
+    text = (ROOT / "docs" / chapter).read_text(encoding="utf-8")
+    return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
+
+
+def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
+    """Run code with a user's modules in a new process."""
+    for name, source in {**modules, "main": code}.items():
+        (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    return python("main.py", cwd=folder)

@@ -18,17 +18,10 @@ ATTACK: Final = (
 
 
 @cache
-def short(scenario: str = "field", observations: bool = True) -> Replay:
+def short(scenario: str = "field") -> Replay:
     """Two players on one world with every kind of fault and noise, 20 s."""
-    return record(
-        ["ddcs-distributed", "pursuit"],
-        scenario,
-        seed=3,
-        world=1,
-        seconds=20,
-        observations=observations,
-        num_trackers=4,
-    )
+    policies = ["ddcs-distributed", "pursuit"]
+    return record(policies, scenario, seed=3, world=1, seconds=20, observations=True, num_trackers=4)
 
 
 @cache

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.support.forks import forks_of
+from tests.support.process import python
 
 EXTRA: tuple[str, ...] = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "wandb")
 EXTRA += ("minari", "moviepy", "onnx")
@@ -24,7 +24,7 @@ sys.meta_path.insert(0, Blocker())
 
 def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run code in a process in which no package of an extra can be imported."""
-    return forks_of("posse").run(f"{BLOCKED}\nsys.argv[1:] = {arguments!r}\n{code}", cwd)
+    return python("-c", f"{BLOCKED}\n{code}", *arguments, cwd=cwd)
 
 
 MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from gymnasium.error import ResetNeeded
-from tests.support.adapters import out_of_band, part
+from tests.support.adapters import out_of_band
 from tests.support.process import printed
-from tests.support.reference.state import snapshot
 
 import posse
 
@@ -58,61 +56,6 @@ def test_seed_split_and_episode_each_make_other_worlds() -> None:
     starts.append(again.reset())
     places = np.concatenate([start[:, 0, :10] for start in starts])
     assert len(np.unique(places, axis=0)) == len(places), "no world comes twice"
-
-
-def test_autoreset_modes_play_the_same_episodes() -> None:
-    """Consecutive episodes, distinguished by the start of the next one."""
-    make: dict[str, Any] = {"seed": 4, "horizon": 20, "num_trackers": 3, "settle_time": 1.0}
-    episodes: dict[str, list[list[npt.NDArray[Any]]]] = {}
-    for mode in ("next_step", "same_step", "disabled"):
-        batch = posse.batch("field", 2, autoreset=mode, **make)
-        observations = batch.reset()
-        episodes[mode] = []
-        for _ in range(3):
-            seen = [observations]
-            for step in range(20):
-                observations, rewards, terminated, truncated, infos = batch.step(actions_for(batch, step))
-                last = step == 19
-                assert truncated.tolist() == [last] * 2
-                assert not terminated.any()
-                if last and mode == "same_step":
-                    seen += [infos["final_obs"], rewards]
-                else:
-                    seen += [observations, rewards]
-            seen.append(np.array(list(part(infos, "metrics/").values())))
-            episodes[mode].append(seen)
-            if mode == "next_step":
-                observations, rewards, _, truncated, infos = batch.step(actions_for(batch, 99))
-                assert (rewards == 0).all()
-                assert not truncated.any()
-                assert not np.any(list(part(infos, "metrics/").values()))
-            elif mode == "disabled":
-                with pytest.raises(ResetNeeded, match="reset_mask"):
-                    batch.step(actions_for(batch, 0))
-                observations = batch.reset(options={"reset_mask": np.array([True, True])})
-    for mode in ("same_step", "disabled"):
-        for one, other in zip(episodes[mode], episodes["next_step"], strict=True):
-            assert_equal(one, other)
-
-
-def test_a_mask_resets_only_the_worlds_it_names() -> None:
-    batch = posse.batch("field", 4, autoreset="disabled")
-    batch.reset(seed=5)
-    for step in range(10):
-        observations = batch.step(actions_for(batch, step))[0]
-    mask = np.array([False, True, False, True])
-    given = mask.copy()
-    before = snapshot(batch)
-    after = batch.reset(options={"reset_mask": given})
-    np.testing.assert_array_equal(given, mask)
-    np.testing.assert_array_equal(after[~mask], observations[~mask])
-    for key, array in snapshot(batch).items():
-        np.testing.assert_array_equal(array[~mask], before[key][~mask], err_msg=key)
-    assert batch.state["world_step"].tolist() == [10, 0, 10, 0]
-    assert batch.state["world_episode"].tolist() == [0, 1, 0, 1]
-    again = posse.batch("field", 4)
-    again.reset(seed=5)
-    np.testing.assert_array_equal(again.reset()[mask], after[mask])
 
 
 @pytest.mark.parametrize("name", ["smart", "leader-loss", "field", "robots"])

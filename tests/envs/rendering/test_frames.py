@@ -111,18 +111,9 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
 
 
 def test_invalid_arguments_are_named() -> None:
-    batch = posse.batch("smart", 2)
+    batch = posse.batch("smart")
     with pytest.raises(ValueError, match=r"size=\(100, 400\).*at least 200 px"):
         Renderer(batch.scenario, size=(100, 400))
     renderer = Renderer(batch.scenario)
     with pytest.raises(ResetNeeded, match="call reset"):
         renderer.draw(batch)
-    batch.reset()
-    mistakes = (
-        (r"world=-1 is not in the batch.*0 to 1", batch, -1, None),
-        ("1 colours do not fit 5 trackers", batch, 0, [TRACKER]),
-        ("'constant' does not fit a renderer of 'smart'", worlds("constant"), 0, None),
-    )
-    for message, drawn, world, colours in mistakes:
-        with pytest.raises(ValueError, match=message):
-            renderer.draw(drawn, world, colours)

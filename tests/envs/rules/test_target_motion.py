@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.support.crowding import headings, points
-from tests.support.reference.state import snapshot
+from tests.support.reference.state import directions, points
 
 import posse
 
@@ -23,7 +22,7 @@ def follow(batch: posse.Batch, steps: int) -> tuple[Complexes, Complexes, npt.ND
     rest = np.tile([-1.0, 0.0], (*batch.action_shape[:2], 1))
     for _ in range(steps + 1):
         places.append(points(batch, "world"))
-        courses.append(headings(batch, "world"))
+        courses.append(directions(batch, "world"))
         turns.append(batch.state["world_turn_rate"].astype(float))
         batch.step(rest)
     return np.array(places), np.array(courses), np.array(turns[1:])
@@ -42,7 +41,6 @@ def test_constant_goes_straight_at_its_speed() -> None:
 def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     batch = posse.batch("accelerating", 200, target_turn_rate=limit, **FAR_AWAY)
     batch.reset(seed=2)
-    first = snapshot(batch)
     places, courses, turns = follow(batch, 400)
     assert np.abs(turns).max() <= limit
     np.testing.assert_allclose(np.abs(courses), 1.0, rtol=1e-5)
@@ -52,33 +50,9 @@ def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     chord = 0.06 * np.sinc(swing / (2 * math.pi))
     np.testing.assert_allclose(moves, chord * middle / np.abs(middle), rtol=1e-4, atol=3e-5)
     np.testing.assert_allclose(swing, turns * 0.1, rtol=1e-4, atol=3e-5)
-    # The turn rate begins as a sine of the drawn amplitude, rate and phase.
-    wave = first["world_weave_amplitude"] * np.sin(first["world_weave_phase"])
-    np.testing.assert_allclose(turns[0], wave, rtol=1e-4, atol=2e-4 * max(1.0, limit))
     assert (np.abs(turns).max(axis=0) > 0.3 * limit).all(), "every one of them turns"
     assert (turns.max(axis=0) > 0).all()
     assert (turns.min(axis=0) < 0).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "low", "high", "deviation"),
-    [("world_weave_amplitude", 0.2, 0.45, 0.025), ("world_weave_rate", 0.2, 0.8, 0.03)],
-)
-def test_the_drawn_numbers_of_the_accelerating_motion_stay_in_range(
-    name: str, low: float, high: float, deviation: float
-) -> None:
-    batch = posse.batch("accelerating", 2000, target_turn_rate=0.5, **FAR_AWAY)
-    batch.reset(seed=2)
-    first = snapshot(batch)[name]
-    follow(batch, 10)
-    walked = snapshot(batch)[name] - first
-    inside = (first > low + 3 * deviation) & (first < high - 3 * deviation)  # not reflected
-    assert walked[inside].std() == pytest.approx(deviation, rel=0.1, abs=0)
-    assert abs(walked[inside].mean()) < 4 * deviation / math.sqrt(inside.sum())
-    follow(batch, 300)
-    last = snapshot(batch)[name]
-    assert low * (1 - 1e-6) <= last.min()
-    assert last.max() <= high * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])

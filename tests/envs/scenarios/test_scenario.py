@@ -103,6 +103,12 @@ def test_numbers_of_numpy_are_taken_as_python_s() -> None:
     assert {type(each) for each in (*scenario.tracker_speeds, *scenario.start_distance, scenario.arena)} == {float}
 
 
+def test_equal_sides_are_one_and_an_unknown_setting_is_a_wrong_argument() -> None:
+    assert posse.get_scenario("search", arena=(20.0, 20.0)) == posse.get_scenario("search")
+    with pytest.raises(TypeError, match="unexpected keyword argument 'num_tracker'"):
+        posse.get_scenario("smart", num_tracker=3)
+
+
 def test_a_horizon_alone_shortens_the_time_to_settle() -> None:
     assert posse.get_scenario("constant", horizon=20).settle_time == pytest.approx(2.0)
     assert posse.get_scenario("constant", horizon=20, control_step=0.05).settle_time == pytest.approx(1.0)
@@ -160,16 +166,6 @@ def test_given_poses_need_no_draw() -> None:
         batch.reset(seed=0)
     batch.reset(seed=0, options=poses)
     batch.step(np.zeros(batch.action_shape))
-
-
-def test_unknown_names_name_the_near_ones() -> None:
-    with pytest.raises(ScenarioError, match=r"unknown scenario 'smrt' \(did you mean 'smart'") as unknown:
-        posse.get_scenario("smrt")
-    assert all(name in str(unknown.value) for name in posse.scenario_names())
-    with pytest.raises(ScenarioError, match=r"unknown setting 'num_tracker' \(did you mean 'num_trackers'"):
-        posse.get_scenario("smart", num_tracker=3)
-    with pytest.raises(TypeError, match="unexpected keyword argument 'num_tracker'"):
-        posse.get_scenario("smart", num_tracker=3)
 
 
 def test_reward_weights_compare_whatever_their_order_and_kind() -> None:

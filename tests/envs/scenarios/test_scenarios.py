@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 from tests.support.adapters import part
-from tests.support.crowding import headings, points
 from tests.support.reference.score import slots
+from tests.support.reference.state import directions, points
 
 import posse
 from posse.scenarios import get_scenario, scenario_names
@@ -134,7 +134,7 @@ def test_every_slot_can_be_followed_without_reversing(formation: str, motion: st
             actions[:, -1, 0] = 1.0
         frame = points(batch, "world", "frame_cos", "frame_sin")
         batch.step(actions)
-        heading, turned_frame = headings(batch, "world"), points(batch, "world", "frame_cos", "frame_sin")
+        heading, turned_frame = directions(batch, "world"), points(batch, "world", "frame_cos", "frame_sin")
         # The frame turns towards the heading, at its limit until it is there.
         turn, error = np.angle(turned_frame / frame), np.angle(heading / frame)
         either = np.abs(error) > 3.1

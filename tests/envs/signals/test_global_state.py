@@ -10,6 +10,7 @@ import numpy.typing as npt
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.envs.test_random_worlds import SETTINGS
+from tests.support.reference.state import directions, points
 
 import posse
 from posse.rules.state import WorldArrays
@@ -70,14 +71,11 @@ def disturb(scenario: posse.Scenario, arrays: WorldArrays, rng: np.random.Genera
 
 def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float32]:
     """Head for the target at random speeds, so that it is pressed, and talk."""
-    state = batch.state
-    dx = state["world_x"][:, None] - state["tracker_x"]
-    dy = state["world_y"][:, None] - state["tracker_y"]
-    c, s = state["tracker_heading_cos"], state["tracker_heading_sin"]
+    away = points(batch, "world")[:, None] - points(batch, "tracker")
     actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
     n = batch.scenario.num_trackers
     actions[:, :n, 0] = np.maximum(actions[:, :n, 0], actions[:, :1, 0])
-    actions[:, :n, 1] = np.clip(np.arctan2(dy * c - dx * s, dx * c + dy * s), -1, 1)
+    actions[:, :n, 1] = np.clip(np.angle(away / directions(batch, "tracker")), -1, 1)
     return actions
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections import defaultdict
 
 import numpy as np
 import numpy.typing as npt
@@ -37,39 +37,30 @@ def slots(s: posse.Scenario) -> Complexes:
     return np.array(wing)
 
 
-@dataclass
 class Episode:
     """Every metric of an episode, computed from its states."""
 
-    scenario: posse.Scenario
-    score: float = 0.0
-    occupied: dict[int, int] = field(default_factory=dict)
-    distance: Array = field(default_factory=lambda: np.zeros(0))
-    progress: Array = field(default_factory=lambda: np.zeros(0))
-    onsets: Array = field(default_factory=lambda: np.zeros(0))
-    contacts: dict[str, int] = field(default_factory=lambda: {"tracker": 0, "obstacle": 0, "target": 0})
-    _start: Complexes | None = None
-    _arrived: npt.NDArray[np.bool_] | None = None
-    _touch: npt.NDArray[np.bool_] | None = None
-    _touched: bool = False
-    _lost_at: int | None = None
-    _working: int = 0
-    _held_from: int | None = None
-    _settled_at: int | None = None
-    _recovered_at: int | None = None
-    _detected_at: int | None = None
-    _least: float = math.inf
-    _steps: int = 0
-    _sums: dict[str, float] = field(default_factory=dict)
+    def __init__(self, scenario: posse.Scenario) -> None:
+        n = scenario.num_trackers
+        self.scenario, self.score = scenario, 0.0
+        self.occupied: dict[int, int] = {}
+        self.distance: Array = np.zeros(n)
+        self.progress: Array = np.zeros(n)
+        self.onsets: Array = np.zeros(n)
+        self._start: Complexes = np.zeros(n, np.complex128)
+        self._arrived = np.zeros(n, np.bool_)
+        self._touch = np.zeros((n, n + 1 + scenario.num_obstacles + 4), np.bool_)
+        self._touched, self._working, self._least = False, n, math.inf
+        self._held_from: int | None = None
+        self._first: dict[str, int] = {}  # the step at which something first happened
+        self._sums: dict[str, float] = defaultdict(float)
 
     def follow(self, state: State) -> None:
         """Process the state after the next step; the first one is the start of the episode."""
         s, n = self.scenario, self.scenario.num_trackers
         p, alive, step = positions(state), working(state), int(state["world_step"])
-        first = self._start is None
-        if self._start is None:
-            self._start, self._arrived = p[:n].copy(), np.zeros(n, np.bool_)
-            self._touch, self._working = np.zeros((n, n + 1 + s.num_obstacles + 4), np.bool_), n
+        if step == 0:
+            self._start = p[:n].copy()
         gaps = free_gaps(s, state)
         self._least = min(self._least, float(gaps.min()))
         self._count_contacts(gaps <= TOUCHING)
@@ -92,19 +83,17 @@ class Episode:
                 for i in range(n)
             ]
         )
-        self.progress = np.zeros(n) if first else self.distance - distance
+        self.progress = self.distance - distance if step else np.zeros(n)
         self.distance = distance
         sees = [can_see(s, state, i) for i in range(n)]
-        if any(sees) and self._detected_at is None:
-            self._detected_at = step
-        count = int(alive.sum())
-        if first:
+        if any(sees):
+            self._first.setdefault("detection", step)
+        if step == 0:
             return
-        self._steps += 1
+        count = int(alive.sum())
         if count < self._working:
             self._working, self._held_from = count, None
-            if self._lost_at is None:
-                self._lost_at = step - 1
+            self._first.setdefault("loss", step - 1)
         self.score = min(1.0, len(taken) / count)
         if len(taken) < count:
             self._held_from = None
@@ -112,17 +101,16 @@ class Episode:
             self._held_from = step
         enough = max(1, round(s.settle_time / s.control_step))
         if self._held_from is not None and step - self._held_from + 1 >= enough:
-            if self._settled_at is None:
-                self._settled_at = self._held_from
-            if self._lost_at is not None and self._recovered_at is None:
-                self._recovered_at = self._held_from
-        assert self._arrived is not None
+            self._first.setdefault("settling", self._held_from)
+            if "loss" in self._first:
+                self._first.setdefault("recovery", self._held_from)
         reach = np.array(s.tracker_speeds)[:, None] * step * s.control_step + s.tolerance
         could = (np.abs(self._start[:, None] - places[None, :]) <= reach).any(axis=1)
         self._arrived |= could & alive
         v = state["tracker_speed"].astype(np.float64) / s.tracker_speeds
         turn = state["tracker_turn_rate"].astype(np.float64) / s.tracker_turn_rates
         for name, value in (
+            ("steps", 1),
             ("score", self.score),
             ("safe_score", 0.0 if self._touched else self.score),
             ("bound", (self._arrived & alive).sum() / count),
@@ -132,17 +120,16 @@ class Episode:
             ("tracker_steps", count),
             ("connected", self._connected(state)),
         ):
-            self._sums[name] = self._sums.get(name, 0.0) + float(value)
+            self._sums[name] += float(value)
 
     def _count_contacts(self, touch: npt.NDArray[np.bool_]) -> None:
         n = self.scenario.num_trackers
-        assert self._touch is not None
         begun = touch & ~self._touch
         self._touch, self._touched = touch, self._touched or bool(touch.any())
         self.onsets = begun.sum(axis=1).astype(np.float64)
-        self.contacts["tracker"] += int(begun[:, :n].sum()) // 2
-        self.contacts["target"] += int(begun[:, n].sum())
-        self.contacts["obstacle"] += int(begun[:, n + 1 :].sum())
+        self._sums["tracker_contacts"] += int(begun[:, :n].sum()) // 2
+        self._sums["target_contacts"] += int(begun[:, n].sum())
+        self._sums["obstacle_contacts"] += int(begun[:, n + 1 :].sum())
 
     def _connected(self, state: State) -> bool:
         s = self.scenario
@@ -158,27 +145,20 @@ class Episode:
         """Return every metric by name."""
         s, sums = self.scenario, self._sums
 
-        def time(step: int | None) -> float:
-            return math.nan if step is None else step * s.control_step
+        def time(name: str, since: int = 0) -> float:
+            return (self._first[name] - since) * s.control_step if name in self._first else math.nan
 
-        recovery = math.nan
-        if self._recovered_at is not None and self._lost_at is not None:
-            recovery = (self._recovered_at - self._lost_at) * s.control_step
         return {
-            "score": sums["score"] / self._steps,
-            "safe_score": sums["safe_score"] / self._steps,
-            "bound": sums["bound"] / self._steps,
-            "detection_time": time(self._detected_at),
-            "settling_time": time(self._settled_at),
-            "recovery_time": recovery,
+            **{name: sums[name] / sums["steps"] for name in ("score", "safe_score", "bound")},
+            "detection_time": time("detection"),
+            "settling_time": time("settling"),
+            "recovery_time": time("recovery", self._first.get("loss", 0)),
             "tracking_error": sums["error"] / sums["tracker_steps"],
             "time_in_sight": sums["sight"] / sums["tracker_steps"],
-            "tracker_contacts": self.contacts["tracker"],
-            "obstacle_contacts": self.contacts["obstacle"],
-            "target_contacts": self.contacts["target"],
+            **{name: sums[name] for name in ("tracker_contacts", "obstacle_contacts", "target_contacts")},
             "contact_free": float(not self._touched),
             "least_gap": self._least,
             "control_effort": sums["effort"] / sums["tracker_steps"],
-            "time_connected": sums["connected"] / self._steps,
-            "duration": self._steps * s.control_step,
+            "time_connected": sums["connected"] / sums["steps"],
+            "duration": sums["steps"] * s.control_step,
         }

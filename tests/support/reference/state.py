@@ -1,4 +1,4 @@
-"""The state of one world, as complex numbers."""
+"""The states of a batch and of one world, as complex numbers."""
 
 from __future__ import annotations
 
@@ -23,6 +23,16 @@ TOUCHING = 0.001  # m, of free width
 def snapshot(batch: posse.Batch) -> State:
     """Return a copy of every state array of a batch."""
     return {name: array.copy() for name, array in batch.state.items()}
+
+
+def points(batch: posse.Batch, name: str, x: str = "x", y: str = "y") -> Complexes:
+    """Return positions x + iy of the state array ``name``."""
+    return np.asarray(batch.state[f"{name}_{x}"].astype(np.float64) + 1j * batch.state[f"{name}_{y}"])
+
+
+def directions(batch: posse.Batch, name: str) -> Complexes:
+    """Return headings cos θ + i sin θ of the state array ``name``."""
+    return points(batch, name, "heading_cos", "heading_sin")
 
 
 def one_world(state: State, e: int) -> State:
