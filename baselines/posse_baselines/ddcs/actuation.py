@@ -136,28 +136,21 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
 
 
 @compiled
-def blocks(disc: Record, clearance: float, ahead: complex) -> bool:
-    """Return whether a standing disc lies on the way along a unit vector, nearer than clearance."""
-    if disc.velocity != 0j or disc.reach > _LARGEST:
-        return False
-    # A little less than the tangent's clearance, or the tangent itself would be blocked.
-    return dot(disc.place, ahead) > 0.0 and abs(cross(disc.place, ahead)) < 0.98 * (disc.reach + clearance)
-
-
-@compiled
 def turn_past(discs: Records, clearance: float, wanted: complex, side: float) -> float:
     """Return the turn (rad, left positive) from a unit vector to a clear direction on a side (1: left, -1: right).
 
-    ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
+    Standing discs are in the way, not walls. ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
     """
     turn, ahead = 0.0, wanted
     for _ in range(_ROUNDS):
         least, nearest = 1e9, -1
         for k in range(len(discs)):
-            if blocks(discs[k], clearance, ahead):
-                distance = length(discs[k].place)
-                if distance < least:
-                    least, nearest = distance, k
+            disc = discs[k]
+            if disc.velocity != 0j or disc.reach > _LARGEST or dot(disc.place, ahead) <= 0.0:
+                continue
+            # A little less than the tangent's clearance, or the tangent itself would be blocked.
+            if abs(cross(disc.place, ahead)) < 0.98 * (disc.reach + clearance) and length(disc.place) < least:
+                least, nearest = length(disc.place), k
         if nearest < 0:
             return turn
         disc = discs[nearest]
