@@ -19,7 +19,7 @@ import numpy as np
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, is_due
 from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
-from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
+from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, unit, vector
 from posse_baselines.laws.guidance import regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_near, put_walls, safe_velocity, to_wall
 from posse_baselines.laws.steering import slot_velocity
@@ -136,28 +136,21 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
 
 
 @compiled
-def blocks(disc: Record, clearance: float, unit: complex) -> bool:
-    """Return whether a standing disc lies on the way along a unit vector, nearer than clearance."""
-    if disc.velocity != 0j or disc.reach > _LARGEST:
-        return False
-    # A little less than the tangent's clearance, or the tangent itself would be blocked.
-    return dot(disc.place, unit) > 0.0 and abs(cross(disc.place, unit)) < 0.98 * (disc.reach + clearance)
-
-
-@compiled
 def turn_past(discs: Records, clearance: float, wanted: complex, side: float) -> float:
     """Return the turn (rad, left positive) from a unit vector to a clear direction on a side (1: left, -1: right).
 
-    ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
+    Standing discs are in the way, not walls. ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
     """
-    turn, unit = 0.0, wanted
+    turn, ahead = 0.0, wanted
     for _ in range(_ROUNDS):
         least, nearest = 1e9, -1
         for k in range(len(discs)):
-            if blocks(discs[k], clearance, unit):
-                distance = length(discs[k].place)
-                if distance < least:
-                    least, nearest = distance, k
+            disc = discs[k]
+            if disc.velocity != 0j or disc.reach > _LARGEST or dot(disc.place, ahead) <= 0.0:
+                continue
+            # A little less than the tangent's clearance, or the tangent itself would be blocked.
+            if abs(cross(disc.place, ahead)) < 0.98 * (disc.reach + clearance) and length(disc.place) < least:
+                least, nearest = length(disc.place), k
         if nearest < 0:
             return turn
         disc = discs[nearest]
@@ -166,18 +159,15 @@ def turn_past(discs: Records, clearance: float, wanted: complex, side: float) ->
         turn = angle_of(disc.place * wanted.conjugate()) + side * half
         if abs(turn) > _MOST_TURN:
             return 2.0 * _MOST_TURN
-        unit = wanted * vector(1.0, turn)
+        ahead = wanted * vector(1.0, turn)
     return 2.0 * _MOST_TURN
 
 
 @compiled
 def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
     """Return the wanted velocity (m/s), turned past what stands in its way."""
-    speed, clearance = length(wanted), team.settings.detour
-    if speed < 1e-6:
-        return wanted
-    unit = complex(wanted.real / speed, wanted.imag / speed)
-    left, right = turn_past(discs, clearance, unit, 1.0), turn_past(discs, clearance, unit, -1.0)
+    ahead, clearance = unit(wanted), team.settings.detour
+    left, right = turn_past(discs, clearance, ahead, 1.0), turn_past(discs, clearance, ahead, -1.0)
     if left == 0.0 and right == 0.0:
         return wanted
     kept = me.side if (me.step - me.side_step) * team.world.dt <= _SIDE_KEPT else 0
@@ -251,7 +241,7 @@ def correct(me: Record, correction: complex) -> None:
         return
     wish = me.wish + scaled(correction * me.heading, me.max_speed)
     excess = max(1.0, length(wish) / max(me.max_speed, length(me.wish)))
-    wish = complex(wish.real / excess, wish.imag / excess)
+    wish = scaled(wish, 1.0 / excess)
     old_speed, old_omega = regulate(me, me.wish, 0.0)
     speed, omega = regulate(me, wish, 0.0)
     me.wish = wish

@@ -87,6 +87,7 @@ CONSTANTS: Final = record_type(
     ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
     ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
     ("area_y", np.float32),  # half its height
+    ("outermost", np.float64),  # distance of the outermost slot from the target, m
 )
 """Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
 
@@ -152,8 +153,6 @@ class Team(NamedTuple):
     """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
     slots: npt.NDArray[np.complex64]
     """(N,) place of each slot in the slot frame, m."""
-    outermost: float
-    """Distance of the outermost slot from the target, m."""
     beams: npt.NDArray[np.complex64]
     """(S,) direction of each sonar beam in the robot's own axes."""
 
@@ -164,6 +163,7 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
     world = constants_of(scenario)
+    world["outermost"] = max(map(abs, slots))
     if settings.foresight == 0.0 or scenario.command_delay > _MOST_WAITING:
         world["delay"] = 0
     return Team(
@@ -171,7 +171,6 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
         world,
         settings_record(settings),
         np.array(slots, np.complex64),
-        max(map(abs, slots)),
         (cosines + 1j * sines).astype(np.complex64),
     )
 
@@ -339,7 +338,7 @@ def for_each(function: Kernel) -> Kernel:
         first: int,
         end: int,
     ) -> None:
-        team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+        team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
         work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):

@@ -138,7 +138,7 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     me.target, theta = target_after(team, me, me.fix_age)
     me.target_theta, me.target_velocity = theta, vector(me.target_speed, theta)
     # How fast the frame turns at most: the outermost slot has to be no faster than a tracker.
-    limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.outermost
+    limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.world.outermost
     me.psi_limit = limit
     psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
     turn = settings.turn_share * me.target_turn * math.exp(-me.fix_age / settings.turn_memory)

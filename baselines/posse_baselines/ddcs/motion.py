@@ -35,7 +35,7 @@ from posse_baselines.ddcs.settings import (
     SEARCHING,
 )
 from posse_baselines.laws import formation, guidance, steering
-from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector, wrap
+from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
@@ -133,8 +133,7 @@ def hunt(team: Team, me: Record) -> None:
     side = 1.0 if me.slot % 2 else -1.0
     angle = me.target_theta + side * ((me.slot + 1) // 2) * 2.0 * math.pi / len(team.slots)
     way = me.target + vector(settings.hunt_growth * me.fix_age, angle) - me.position
-    distance = length(way)
-    want(me, scaled(way, min(me.max_speed, settings.gain * distance) / max(distance, 1e-6)), 0.0)
+    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))), 0.0)
 
 
 @compiled
@@ -176,8 +175,8 @@ def pursue(team: Team, me: Record) -> None:
         if me.task == FLOCKING:
             # In front of the target, heading away from it, the bearing turns the other way.
             constant *= clip(math.cos(wanted_theta - wanted_sigma) / guidance.MIN_COSINE, -1.0, 1.0)
-    delta = guidance.deviation(guidance.lawful_heading(sigma, constant, wanted_sigma, wanted_theta), sigma)
-    target = vector(me.target_speed, guidance.deviation(me.target_theta, sigma))
+    delta = wrap(guidance.lawful_heading(sigma, constant, wanted_sigma, wanted_theta) - sigma)
+    target = vector(me.target_speed, wrap(me.target_theta - sigma))
     if me.task == FLOCKING:
         wanted_range = length(arm)
         speed = guidance.maintenance_speed(
@@ -348,10 +347,7 @@ def wander(team: Team, me: Record, mates: Records) -> complex:
     if me.goal_step < 0 or arrived or time > settings.goal_time:
         choose_goal(team, me, mates)
         way = me.goal - me.position
-    distance = length(way)
-    if distance < 1e-6:
-        return 0j
-    return complex(me.max_speed * way.real / distance, me.max_speed * way.imag / distance)
+    return scaled(unit(way), me.max_speed)
 
 
 @compiled
@@ -409,7 +405,7 @@ def choose_goal(team: Team, me: Record, mates: Records) -> None:
             # A tracker that hears few others stays near the middle, where a report is likely heard.
             bonus -= settings.middle_weight * deaf * length(place - me.area)
             way = length(place - me.position)
-            turn = 1.0 - dot(place - me.position, me.heading) / max(way, 1e-6)
+            turn = 1.0 - dot(unit(place - me.position), me.heading)
             value = settings.age_weight * age + bonus - way - settings.turn_weight * turn
             if value <= best:
                 continue  # team-mates can only reduce it

@@ -28,7 +28,7 @@ from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import Team, Work, is_due
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
-from posse_baselines.laws.geometry import dot, length
+from posse_baselines.laws.geometry import dot, length, unit
 from posse_baselines.laws.steering import Course, assign, time_to_slot
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
@@ -150,7 +150,7 @@ def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: in
     way = me.target + slot * me.frame - position
     time = time_to_slot(way, course_of(team, me), me.max_speed)
     # Time for turning towards it, up to half a turn.
-    facing = dot(way, heading) / max(length(way), 1e-6)
+    facing = dot(unit(way), heading)
     time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)
     # With more slots than trackers, those that see the target are filled first.
     if dot(slot, slot) < (settings.in_sight * team.world.sight) ** 2:

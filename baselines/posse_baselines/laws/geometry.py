@@ -49,6 +49,18 @@ def length(v: complex) -> float:
 
 
 @compiled
+def scaled(v: complex, factor: float) -> complex:
+    """Return a vector times a number; compiled code would multiply by a complex number instead."""
+    return complex(v.real * factor, v.imag * factor)
+
+
+@compiled
+def unit(v: complex) -> complex:
+    """Return a vector's direction as a unit vector; of one that is nearly zero, a shorter one."""
+    return scaled(v, 1.0 / max(length(v), 1e-6))
+
+
+@compiled
 def angle_of(v: complex) -> float:
     """Return the direction (rad) of a vector, in [-π, π]."""
     return math.atan2(v.imag, v.real)
@@ -58,9 +70,3 @@ def angle_of(v: complex) -> float:
 def vector(size: float, angle: float) -> complex:
     """Return the vector of a length and a direction (rad)."""
     return complex(size * math.cos(angle), size * math.sin(angle))
-
-
-@compiled
-def scaled(v: complex, factor: float) -> complex:
-    """Return a vector times a number; compiled code would multiply by a complex number instead."""
-    return complex(v.real * factor, v.imag * factor)

@@ -7,7 +7,7 @@ the indices i (target) and i+1 (tracker), which are written out:
 ``r``       m      distance from tracker to target
 ``sigma``   rad    angle of the line of sight, from the tracker to the target
 ``theta``   rad    a heading
-``delta``   rad    deviation of a heading from the line of sight, ``θ - σ``
+``delta``   rad    deviation of a heading from the line of sight, ``θ - σ``: (1), (2)
 ==========  =====  ============================================================
 
 One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1),
@@ -67,12 +67,6 @@ def line_of_sight(tracker: complex, target: complex) -> tuple[float, float]:
     """
     way = target - tracker
     return math.hypot(way.real, way.imag), wrap(angle_of(way))
-
-
-@compiled
-def deviation(theta: float, sigma: float) -> float:
-    """Return δ (rad, (-π, π]), the angle from the line of sight to a heading: (1), (2)."""
-    return wrap(theta - sigma)
 
 
 @compiled
