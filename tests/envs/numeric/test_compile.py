@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -15,6 +16,32 @@ from tests.support.process import python
 from posse.numeric import UNCOMPILED, compiled, kernel, out_of_line
 
 pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
+
+
+PARTS = """
+numba.core.caching NullCache.load_overload NullCache.save_overload
+numba.core.codegen JITCodeLibrary.add_ir_module JITCodeLibrary.enable_object_caching JITCodeLibrary.has_dynamic_globals
+numba.core.codegen JITCodeLibrary._optimize_functions JITCodeLibrary._optimize_final_module JITCPUCodegen.magic_tuple
+numba.core.codegen JITCodeLibrary._finalize_final_module JITCPUCodegen.set_env
+numba.core.compiler CompilerBase.define_pipelines DefaultPassBuilder.define_nopython_pipeline Flags.forceinline
+numba.core.compiler CompileResult._reduce CompileResult._rebuild Flags.no_cpython_wrapper
+numba.core.extending models.OpaqueModel models.PrimitiveModel register_model
+numba.core.imputils lower_builtin lower_cast lower_constant
+numba.core.registry CPUDispatcher.recompile CPUDispatcher._numba_type_
+numba.core.serialize dumps
+numba.core.types Dispatcher.get_call_type unliteral
+numba.core.typing.templates AbstractTemplate ConcreteTemplate infer_global signature
+llvmlite.binding create_pass_builder create_pipeline_tuning_options
+"""
+
+
+def test_numba_has_the_inner_parts_that_are_used() -> None:
+    for module, *names in map(str.split, PARTS.strip().splitlines()):
+        for name in names:
+            part: Any = importlib.import_module(module)
+            for each in name.split("."):
+                part = getattr(part, each, None)
+            assert part is not None, f"numba {numba.__version__} lacks {module}.{name}, which posse.numeric uses"
 
 
 @out_of_line
