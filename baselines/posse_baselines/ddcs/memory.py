@@ -313,7 +313,7 @@ class Minds(OwnArrays):
     def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
         """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
         work, rows = work_for(self.mates.shape[2]), in_units(self.layout, observations)
-        over_worlds(kernel, (self.team, self.me, self.mates, work, rows, out), *self.me.shape)
+        over_worlds(kernel, ((self.team, self.me, self.mates), work, rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
@@ -327,22 +327,13 @@ def for_each(function: Kernel) -> Kernel:
     """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
 
     @kernel
-    def run(
-        shared: Team,
-        minds: Records,
-        mates: Records,
-        works: Work,
-        rows: FloatArray,
-        out: FloatArray,
-        thread: int,
-        first: int,
-        end: int,
-    ) -> None:
+    def run(minds: Any, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
+        shared, me, mates = minds
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
         work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
-                function(team, minds[e, i], mates[e, i], rows[e, i], work, out[e, i])
+                function(team, me[e, i], mates[e, i], rows[e, i], work, out[e, i])
 
     return run
 
