@@ -327,21 +327,13 @@ def for_each(function: Kernel) -> Kernel:
     """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
 
     @kernel
-    def run(
-        memory: tuple[Team, Records, Records],
-        works: Work,
-        rows: FloatArray,
-        out: FloatArray,
-        thread: int,
-        first: int,
-        end: int,
-    ) -> None:
-        shared, minds, mates = memory
+    def run(minds: Any, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
+        shared, me, mates = minds
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
         work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
         for e in range(first, end):
             for i in range(rows.shape[1]):
-                function(team, minds[e, i], mates[e, i], rows[e, i], work, out[e, i])
+                function(team, me[e, i], mates[e, i], rows[e, i], work, out[e, i])
 
     return run
 
