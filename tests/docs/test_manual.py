@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from tests.support.browser import Tags
-from tests.support.pages import ROOT
+from tests.support.pages import FENCE, PAGES, ROOT
 
 import posse
 
@@ -65,6 +65,13 @@ def test_the_manual_is_short() -> None:
     assert sum(len(re.findall(r"\S*\w\S*", text)) for text in texts) <= 15_000
 
 
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_its_code_has_72_columns(page: str) -> None:
+    listed = [ROOT / name for name in re.findall(r'--8<-- "(.+\.py)"', PAGES[page])]
+    texts = [text for _, _, text in FENCE.findall(PAGES[page])] + [path.read_text(encoding="utf-8") for path in listed]
+    assert [line for text in texts for line in text.splitlines() if len(line) > 72] == []
+
+
 @pytest.mark.parametrize("module", MODULES)
 def test_every_public_name_is_in_the_reference(site: Path, module: str) -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in (site / "reference").rglob("*.html"))
@@ -90,4 +97,4 @@ def test_no_page_loads_anything_from_another_host(site: Path) -> None:
 def test_the_repository_has_one_address() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert f"repo_url: {project['urls']['Repository']}\n" in settings
+    assert f"repo_url: {project['urls']['Repository']} " in settings
