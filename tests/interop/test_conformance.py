@@ -139,6 +139,13 @@ def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
     assert [info["working"].sum(axis=1).tolist() for info in infos] == [[5] * 3] * 2 + [[4] * 3] * 2
     with pytest.raises(ValueError, match="read-only"):
         infos[0]["metrics/duration"][0] = 1.0
+    for name in ("Team", "Tracker"):
+        env = gymnasium.make_vec(f"posse/{name}-v0", 3, **settings)
+        first = env.reset(seed=1)[1]
+        told = [env.step(np.zeros(env.action_space.shape or (), np.float32))[-1] for _ in range(4)]
+        last = told[-1]["final_info"] if autoreset == "same_step" else told[-1]
+        assert first.keys() == last.keys() == KEYS | {"working"} | {f"_{key}" for key in (*KEYS, "working")}
+        assert last["metrics/duration"] == pytest.approx(0.4)
 
 
 @pytest.mark.long
