@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import ray
@@ -116,6 +117,17 @@ def test_a_command_gives_the_same_file(command: str, nodes: Cluster, folder: Pat
     status = [main([*command.split(), "--out", name, *more]) for name, *more in (["here"], ["there", "--ray"])]
     assert status[0] == status[1] == int("Crashes" in command)
     assert filecmp.cmp(folder / "here" / COMMANDS[command], folder / "there" / COMMANDS[command], shallow=False)
+    assert not WORK.exists()
+
+
+def test_an_interrupted_comparison_resumes(nodes: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    command = [*f"compare idle pursuit --scenario smart constant {COMPARE} --ray".split()]
+    with monkeypatch.context() as patch:
+        patch.setattr(Results, "write", Mock(side_effect=KeyboardInterrupt))
+        assert main(command) == 130
+    assert WORK.is_dir()
+    monkeypatch.setattr("posse_training.parallel._play", None)  # no shard is played
+    assert main(command) == 0
     assert not WORK.exists()
 
 
