@@ -20,11 +20,12 @@ SCENARIOS: Final = tuple(name for name in posse.scenario_names() if not name.sta
 ONLY: Final = {
     "ddcs-centralized-no-exchange": ("leader-loss",),
     "ddcs-no-radio": ("search", "radio", "field"),
-    "belief-planner": (),  # seconds a world: posse compare belief-planner ddcs-tuned
     "idle": (),
     "random": (),
 }
 """Policies that are of interest on some scenarios alone."""
+SLOW: Final = ("planner", "belief-planner")
+"""Policies that take 0.3 to 5 s for each world."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class Settings:
     policies: tuple[str, ...] = policy_names()
     scenario: tuple[str, ...] = SCENARIOS
     worlds: int = WORLDS
-    planner_worlds: int = 100
-    """Worlds of policies that read the state: the planner takes 0.3 s and more for each."""
+    slow_worlds: int = 100
+    """Worlds of policies that play ahead."""
 
 
 def plays(name: str, scenario: str) -> bool:
@@ -54,7 +55,7 @@ def main() -> None:
             if not plays(name, scenario):
                 continue
             policy = load(name)
-            worlds = settings.planner_worlds if policy.reads_state else settings.worlds
+            worlds = settings.slow_worlds if name in SLOW else settings.worlds
             row = measure(name, name, policy, scenario, worlds, SEED)
             rows[scenario, name] = row
             print(f"{scenario:12s} {name:30s} {row.safe_score:.3f} [{row.low:.3f}, {row.high:.3f}]", flush=True)
