@@ -16,7 +16,7 @@ import tyro
 from rich.console import Console
 
 import posse
-from posse_baselines.files import write_atomically
+from posse_baselines.files import write_atomically, write_json
 from posse_baselines.tuned import TUNED, tuned_files
 from posse_training import evaluate
 from posse_training.tune import TuneSettings, tune
@@ -47,7 +47,7 @@ def check_all() -> Iterator[str]:
             check["safe_score"] = float(played["safe_score"].mean())
             card.setdefault("tuned_version", card["scenario_version"])
             card["scenario_version"] = posse.get_scenario(path.stem).version
-            write_atomically(path, (json.dumps(card, indent=2, sort_keys=True) + "\n").encode())
+            write_json(path, card)
             yield f"{name} {path.stem}: {before:.3f} -> {check['safe_score']:.3f}"
 
 

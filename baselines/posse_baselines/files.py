@@ -24,6 +24,11 @@ def write_atomically(path: Path, content: bytes) -> None:
         file.write(content)
 
 
+def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
+    """Write a value as JSON, as :func:`write_atomically` does."""
+    write_atomically(path, (json.dumps(value, indent=indent) + "\n").encode())
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a new, empty file beside ``path`` to write to, which replaces ``path`` at the end.

@@ -25,13 +25,13 @@ SCENARIOS: Final = tuple(n for n in posse.scenario_names() if not n.startswith("
 
 @functools.cache
 def standings(path: Path) -> tuple[Standing, ...]:
-    """Return the rows of test worlds of the present scenarios, the best first."""
+    """Return the rows of the present scenarios, the best first."""
     try:
         rows = read_standings(path)
     except SettingsError as error:
         raise PluginError(str(error)) from error
     versions = {name: posse.get_scenario(name).version for name in SCENARIOS}
-    known = [row for row in rows if row.split == "test" and versions.get(row.scenario) == row.version]
+    known = [row for row in rows if versions.get(row.scenario) == row.version]
     return tuple(sorted(known, key=lambda row: -row.safe_score))
 
 

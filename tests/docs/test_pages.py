@@ -70,7 +70,7 @@ def test_the_speed_benchmark_measures(tmp_path: Path) -> None:
     assert {"machine", "batches", "one_world"} <= figures.keys()
 
 
-ROW = Standing("a team", "a.b:C", False, "smart", 1, "test", 2026, 1000, 0.5, 0.4, 0.6, 0.7, 0.75, "932670c6b288")
+ROW = Standing("a team", "a.b:C", False, "smart", 1, 2026, 1000, 0.5, 0.4, 0.6, 0.7, 0.75, "932670c6b288")
 
 
 @pytest.fixture
@@ -100,13 +100,13 @@ def lines(text: str, scenario: str) -> list[list[str]]:
 def test_teams_are_ranked_by_the_safe_score(
     hook: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of the test split, the present version and enough worlds."""
+    """Those of the present version and enough worlds."""
     rows: list[dict[str, Any]] = [
         {"label": "third", "safe_score": 0.45},
         {"label": "first", "safe_score": 0.55, "seed": 7},
         {"label": "second"},
         {"label": "knows", "safe_score": 0.6, "reads_state": True, "worlds": 100},
-        *({"label": "unlisted", **change} for change in ({"split": "train"}, {"version": 99}, {"worlds": 999})),
+        *({"label": "unlisted", **change} for change in ({"version": 99}, {"worlds": 999})),
     ]
     path, standings = tmp_path / "standings.csv", hook("standings")
     path.write_text(standings_text([dataclasses.replace(ROW, **row) for row in rows]), encoding="utf-8")

@@ -14,7 +14,7 @@ from tests.support.runs import HORIZON, killed_at, quiet
 from posse_baselines import PolicyError
 from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.league import FILE, MATRIX, SUMMARY, LeagueSettings, draw_matrix, play_league, shares, tables
+from posse_training.league import LeagueSettings, draw_matrix, play_league, shares, tables
 from posse_training.train.train import Run
 
 
@@ -48,7 +48,7 @@ def everything(folder: Path) -> dict[str, Any]:
     for path in sorted(folder.rglob("*.safetensors")):
         tensors = load_file(path)
         found[str(path.relative_to(folder))] = {k: a.tobytes() for k, a in tensors.items()}
-    for name in (MATRIX, SUMMARY, FILE):
+    for name in ("matrix.csv", "summary.json", "league.json"):
         found[name] = (folder / name).read_text(encoding="utf-8").replace(str(folder), "FOLDER")
     return found
 
@@ -61,7 +61,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     assert len(found.cells) == 9
     assert [e.label for e in found.exploited] == ["trackers-2", "target-2"]
     gained = found.exploited[0]
-    assert gained.gain == pytest.approx(gained.before.score.value - gained.after.score.value), "of a target"
+    assert gained.gain == pytest.approx(gained.before["score"].value - gained.after["score"].value), "of a target"
     for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
         with killed_at(owner, name, call):
             play_league(tiny(tmp_path / "cut"), console=quiet())
@@ -87,8 +87,8 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match=r"holds a run with seed=1, not 2"):
         play_league(replace(settings, seed=2), console=quiet())
     more = play_league(replace(settings, episodes=2), console=quiet())
-    assert more.cells[0].score.count == 2, "what is no training may be changed"
-    (tmp_path / FILE).write_text("[")
+    assert more.cells["idle", "smart"]["score"].count == 2, "what is no training may be changed"
+    (tmp_path / "league.json").write_text("[")
     with pytest.raises(RunFolderError, match="is damaged"):
         play_league(settings, console=quiet())
 

@@ -13,7 +13,7 @@ from tests.support.tunable import BEST, POLICY, small
 
 from posse_baselines import DDCS, Tunable, tunables
 from posse_training.cli import main
-from posse_training.errors import CheckpointError, RunFolderError, SettingsError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.files import locked
 from posse_training.tune import Space, TuneSettings, _Run, tune
 
@@ -59,7 +59,7 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
         (["pngl", "--scenario", "smrt"], "unknown scenario 'smrt' (did you mean 'smart'"),
         (["pngl", "--minutes", "nan"], "minutes=nan must lie in [0.001, 10000]"),
         (["pngl", "--seed", "-1"], "seed=-1 must lie in"),
-        (["pngl", "--only", "gian"], "only='gian' is not a tunable setting of 'pngl'"),
+        (["pngl", "--only", "gian"], "unknown tunable setting of 'pngl' 'gian' (did you mean 'gain'"),
     ],
 )
 def test_invalid_settings_are_refused_before_anything_is_written(
@@ -86,7 +86,7 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
     tune(small(tmp_path / "run", generations=1), console=quiet())
     path = tmp_path / "run/state.json"
     path.write_text(path.read_text()[:100])
-    with pytest.raises(CheckpointError, match=r"state\.json is damaged"):
+    with pytest.raises(RunFolderError, match=r"state\.json is damaged"):
         tune(small(tmp_path / "run"), console=quiet())
 
 

@@ -49,8 +49,7 @@ class PosseTaskClass(TaskClass):
 
     def max_steps(self, env: EnvBase) -> int:
         """Return the length of an episode."""
-        steps: int = env.batch.scenario.horizon
-        return steps
+        return int(env.batch.scenario.horizon)
 
     def has_render(self, env: EnvBase) -> bool:
         """Return ``False``: ``posse watch`` and ``posse replay`` show what was learned."""
@@ -58,8 +57,7 @@ class PosseTaskClass(TaskClass):
 
     def group_map(self, env: EnvBase) -> dict[str, list[str]]:
         """Return the agents' names by group."""
-        groups: dict[str, list[str]] = env.group_map
-        return groups
+        return dict(env.group_map)
 
     def observation_spec(self, env: EnvBase) -> Composite:
         """Return the spec of what the trackers observe."""

@@ -6,13 +6,12 @@ import json
 import re
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import gymnasium
 import numpy as np
-import numpy.typing as npt
 import tyro
 
 import posse
@@ -20,7 +19,7 @@ from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
 from posse_training.evaluation.evaluation import progress_bar
-from posse_training.options import Changes
+from posse_training.options import Worlds
 from posse_training.provenance import commit
 
 if TYPE_CHECKING:
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["record_dataset"]
 
 _RECORD: Final = ("observations", "actions", "rewards", "terms", "score", "terminated", "truncated")
-Metadata = dict[str, Any]
 
 
 def record_dataset(
@@ -87,12 +85,12 @@ def record_dataset(
     folder = Path(out).resolve()  # Minari joins a relative one to itself
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
+    where = {"seed": seed, "split": split}
     about = {
         "version": posse.__version__,
         "commit": commit(),
         "scenario": settings.to_dict(),
-        "seed": seed,
-        "split": split,
+        **where,
         "policies": [{"name": each.name, "card": getattr(each, "card", None)} for each in players],
     }
     env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
@@ -101,7 +99,6 @@ def record_dataset(
         "author": {"posse"},
         "algorithm_name": name,
         "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
-        "code_permalink": f"posse {posse.__version__} {about['commit'] or ''}",
         "requirements": [f"posse-rl=={posse.__version__}"],
         "minari_version": minari.__version__,
         "posse": json.dumps(about),
@@ -115,7 +112,7 @@ def record_dataset(
         storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
         storage.update_metadata(described)
         for world in bar.track(range(episodes), description="episodes"):
-            buffer, metadata = _episode(players[world % len(players)], settings, world, seed, split)
+            buffer, metadata = _episode(players[world % len(players)], settings, world, where)
             storage.update_episodes([buffer])
             storage.update_episode_metadata([metadata], [world])
         (folder / called).parent.mkdir(parents=True, exist_ok=True)
@@ -123,7 +120,9 @@ def record_dataset(
     return minari.MinariDataset(folder / called / "data")
 
 
-def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: str) -> tuple[EpisodeBuffer, Metadata]:
+def _episode(
+    policy: Policy, settings: Scenario, world: int, where: dict[str, Any]
+) -> tuple[EpisodeBuffer, dict[str, Any]]:
     """Play a world and return its buffer and metadata.
 
     Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's. Infos are ``score``
@@ -131,45 +130,35 @@ def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: s
     """
     from minari.data_collector import EpisodeBuffer
 
-    batch = Batch(settings, 1, seed=seed, split=split, first_world=world, autoreset="disabled", num_threads=1)
+    batch = Batch(settings, 1, **where, first_world=world, autoreset="disabled", num_threads=1)
     played = rollout(batch, policy, _RECORD)
-    terms = {name: _after_zero(term[:, 0]) for name, term in played.named("reward").items()}
+    terms = {name: np.insert(term[:, 0], 0, 0, axis=0) for name, term in played.named("reward").items()}
     buffer = EpisodeBuffer(
         id=world,
-        seed=seed,
+        seed=where["seed"],
         observations=played["observations"][:, 0],
         actions=played["actions"][:, 0],
         rewards=played["rewards"][:, 0].mean(axis=1, dtype=np.float64).tolist(),
         terminations=played["terminated"][:, 0].tolist(),
-        truncations=(played["truncated"] & ~played["terminated"])[:, 0].tolist(),
-        infos={"score": _after_zero(played["score"][:, 0].astype(np.float64)), "reward": terms},
+        truncations=played["truncated"][:, 0].tolist(),
+        infos={"score": np.insert(played["score"][:, 0].astype(np.float64), 0, 0), "reward": terms},
     )
     metrics = {name: float(column[0]) for name, column in played.metrics.items()}
     return buffer, {"policy": policy.name, "world": world, **metrics}
 
 
-def _after_zero(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    return np.concatenate([np.zeros_like(rows[:1]), rows])
-
-
-@dataclass(frozen=True)
-class _Record:
+@dataclass(frozen=True, kw_only=True)
+class _Record(Worlds):
     """Record episodes as a Minari data set: of one policy, or of several in turn."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Policies: names, files, or package.module:Class."""
-    scenario: str = "smart"
-    """Scenario to play."""
-    overrides: Changes = field(default_factory=dict)
-    """Settings of the scenario to change, such as num_trackers=3 or arena=6,4."""
     episodes: int = 1000
     """How many."""
     out: Path = Path("runs/datasets")
     """Folder of Minari data sets; MINARI_DATASETS_PATH for those who load it."""
     name: str | None = None
     """Name of the data set; default: the policies'."""
-    seed: int = 7
-    """Seed of the worlds."""
     split: str = "train"
     """Split of the worlds: train, validation or test."""
 

@@ -18,19 +18,11 @@ class SettingsError(UserError, ValueError):
 
 
 class RunFolderError(UserError, RuntimeError):
-    """A run folder that cannot be used; the message says why and what to do."""
-
-
-class CheckpointError(UserError, RuntimeError):
-    """A checkpoint that cannot be written or read."""
+    """A run folder or a file in it that cannot be used; the message says why and what to do."""
 
 
 class DivergedError(UserError, RuntimeError):
     """A training whose networks give numbers that are not finite."""
-
-
-class TrainedSplitError(UserError, ValueError):
-    """An evaluation on worlds that the policy was trained on."""
 
 
 class PlayError(UserError, RuntimeError):

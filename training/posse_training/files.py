@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.files import read_json, remove_unfinished, write_atomically
+from posse_baselines.files import read_json, remove_unfinished, write_json
 from posse_training.errors import RunFolderError
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
 
 _LOCK: Final = "lock"
 
@@ -33,14 +29,13 @@ def locked(folder: Path) -> Iterator[None]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a+", encoding="utf-8") as file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                holder = (folder / _LOCK).read_text(encoding="utf-8").strip() or "unknown"
-                raise RunFolderError(
-                    f"{folder} is in use by process {holder}: wait for it, stop it, or choose another --out"
-                ) from error
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = (folder / _LOCK).read_text(encoding="utf-8").strip() or "unknown"
+            raise RunFolderError(
+                f"{folder} is in use by process {holder}: wait for it, stop it, or choose another --out"
+            ) from error
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
         file.flush()
@@ -54,16 +49,23 @@ def check_new(out: Path) -> None:
         raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
 
 
+@contextlib.contextmanager
+def intact(path: Path) -> Iterator[None]:
+    """Raise an error that names the file if one of a run is read that is damaged."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another --out") from error
+
+
 def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
     """Raise if a file holds other settings of a run, but for those that are ``free``."""
     if not path.is_file():
         return
     wanted = json.loads(json.dumps(settings))
-    try:
+    with intact(path):
         theirs = read_json(path)
         other = {name: theirs[name] for name in wanted if name not in free and theirs[name] != wanted[name]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another --out") from error
     if other:
         shown = ", ".join(f"{name}={value!r:.60}, not {wanted[name]!r:.60}" for name, value in other.items())
         raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another --out, or remove it")
@@ -72,4 +74,4 @@ def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = 
 def hold_settings(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
     """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
     check_held(path, settings, free)
-    write_atomically(path, (json.dumps(settings, indent=2) + "\n").encode())
+    write_json(path, settings)

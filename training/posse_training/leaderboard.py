@@ -12,7 +12,7 @@ import json
 import re
 import secrets
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -27,7 +27,7 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.files import check_new
 from posse_training.provenance import commit
 
-__all__ = ["Standing", "Verdict", "read_standings", "submit", "verify"]
+__all__ = ["Standing", "read_standings", "submit", "verify"]
 
 SEED: Final = 2026
 WORLDS: Final = 1000
@@ -51,7 +51,6 @@ class Standing:
     reads_state: bool
     scenario: str
     version: int
-    split: str
     seed: int
     worlds: int
     safe_score: float
@@ -62,24 +61,15 @@ class Standing:
     commit: str
 
     def __post_init__(self) -> None:
-        check_texts(**{name: value for name, value in vars(self).items() if isinstance(value, str)})
+        check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
+
+    def agrees(self, other: Standing) -> bool:
+        """Return whether the intervals of both safe scores overlap."""
+        return self.low <= other.high and other.low <= self.high
 
     def __str__(self) -> str:
         interval = f"{self.safe_score:.4f} [{self.low:.4f}, {self.high:.4f}]"
         return f"{self.label} on {self.scenario}: safe score {interval}, {self.worlds:,} worlds, seed {self.seed}"
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """A claim, and what the policy scores on worlds that nobody could know: it ranks."""
-
-    claim: Standing
-    measured: Standing
-
-    @property
-    def holds(self) -> bool:
-        """Whether the intervals of both safe scores overlap."""
-        return self.claim.low <= self.measured.high and self.measured.low <= self.claim.high
 
 
 def check_texts(**texts: str) -> None:
@@ -93,20 +83,17 @@ def measure(label: str, text: str, policy: Policy, scenario: str, worlds: int, s
     """Play a policy and return its row; ``text`` is what it was loaded from."""
     results = evaluate(policy, scenario, worlds, seed)
     safe = results.estimate("safe_score")
+    scores = {"safe_score": safe.value, "low": safe.low, "high": safe.high}
+    scores |= {name: float(results[name].mean()) for name in ("score", "contact_free")}
     return Standing(
         label=label,
         policy=text,
         reads_state=bool(policy.reads_state),
         scenario=scenario,
         version=results.scenario.version,
-        split=results.split,
         seed=seed,
         worlds=worlds,
-        safe_score=round(safe.value, 6),
-        low=round(safe.low, 6),
-        high=round(safe.high, 6),
-        score=round(float(results["score"].mean()), 6),
-        contact_free=round(float(results["contact_free"].mean()), 6),
+        **{name: round(value, 6) for name, value in scores.items()},
         commit=commit() or "",
     )
 
@@ -116,7 +103,7 @@ def standings_text(rows: Iterable[Standing]) -> str:
     writer = csv.writer(out := io.StringIO(), lineterminator="\n")
     writer.writerow(field.name for field in fields(Standing))
     for row in rows:
-        writer.writerow(value if isinstance(value, str) else json.dumps(value) for value in vars(row).values())
+        writer.writerow(value if isinstance(value, str) else json.dumps(value) for value in asdict(row).values())
     return out.getvalue()
 
 
@@ -142,9 +129,8 @@ def submit(
     scenario: str = "smart",
     name: str | None = None,
     episodes: int = WORLDS,
-    seed: int = SEED,
 ) -> Standing:
-    """Play a scenario for the leaderboard, on its split ``test``, and write the claim.
+    """Play a scenario for the leaderboard, on worlds of its split ``test`` and the seed 2026, and write the claim.
 
     Args:
         policy: A name, a policy file, which is copied, or ``package.module:Class``.
@@ -152,7 +138,6 @@ def submit(
         scenario: Name of the scenario.
         name: Name on the leaderboard; default: the policy's.
         episodes: Number of worlds; 1,000 or more are ranked.
-        seed: Seed of the worlds.
 
     Raises:
         SettingsError: An invalid name; nothing is played.
@@ -163,7 +148,7 @@ def submit(
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
     check_new(out)
-    claim = measure(label, text, loaded, scenario, episodes, seed)
+    claim = measure(label, text, loaded, scenario, episodes, SEED)
     out.mkdir(parents=True, exist_ok=True)
     if is_file:
         write_atomically(out / text, Path(policy).read_bytes())
@@ -176,11 +161,11 @@ def verify(
     run_code: bool = False,
     episodes: int = WORLDS,
     seed: int | None = None,
-) -> Verdict:
-    """Play a submission's policy on worlds of a fresh seed.
+) -> tuple[Standing, Standing]:
+    """Play a submission's policy on worlds of a fresh seed; return what it claims and what it scores there.
 
-    The standing is the score there, whatever was claimed: worlds that are known can be trained or planned on. The claim
-    holds if the intervals of both safe scores overlap.
+    The score there ranks, whatever was claimed: worlds that are known can be trained or planned on. The claim holds if
+    it agrees with it.
 
     Args:
         folder: Folder that ``posse submit`` wrote.
@@ -199,11 +184,9 @@ def verify(
         raise SettingsError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
     if is_code(text) and not run_code:
         raise SettingsError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
-    if not is_code(text) and text not in policy_names() and Path(text).suffix not in FILES:
-        raise SettingsError(f"{path}: policy={text!r} is neither shipped nor a policy file beside it, nor code")
     policy = load(str(folder / text) if Path(text).suffix in FILES else text)
     drawn = secrets.randbelow(2**31) if seed is None else seed
-    return Verdict(claim, measure(claim.label, text, policy, claim.scenario, episodes, drawn))
+    return claim, measure(claim.label, text, policy, claim.scenario, episodes, drawn)
 
 
 def submit_command(arguments: Sequence[str]) -> None:
@@ -213,9 +196,8 @@ def submit_command(arguments: Sequence[str]) -> None:
 
 def verify_command(arguments: Sequence[str]) -> int:
     """``posse verify``: play, print the verdict and the row for the leaderboard; 1 if the claim does not hold."""
-    verdict = tyro.cli(verify, prog="posse verify", args=arguments)
-    for name, row in vars(verdict).items():
-        print(f"{name}: {row}")
-    print(f"the claim {'holds' if verdict.holds else 'DOES NOT HOLD'}")
-    print("the measured row:", standings_text([verdict.measured]).splitlines()[1])
-    return 0 if verdict.holds else 1
+    claim, measured = tyro.cli(verify, prog="posse verify", args=arguments)
+    print(f"claim: {claim}\nmeasured: {measured}")
+    print(f"the claim {'holds' if (holds := claim.agrees(measured)) else 'DOES NOT HOLD'}")
+    print("the measured row:", standings_text([measured]).splitlines()[1])
+    return 0 if holds else 1

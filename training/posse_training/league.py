@@ -6,10 +6,9 @@ Everything is kept in the folder, so that the same command resumes a league that
 from __future__ import annotations
 
 import csv
-import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -20,8 +19,9 @@ from rich.table import Table
 from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.fields import number
-from posse_baselines.files import read_json, replacing, write_atomically
+from posse_baselines.files import read_json, replacing, write_json
 from posse_baselines.policies.open_loop import OPEN_LOOP
+from posse_baselines.registry import is_code
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
@@ -29,21 +29,20 @@ from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked
 from posse_training.options import Changes, Pairs
 from posse_training.train.presets import default_settings
-from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings
+from posse_training.train.settings import BEST, LAST, TrainSettings
 
-FILE: Final = "league.json"
-MATRIX: Final = "matrix.csv"
-SUMMARY: Final = "summary.json"
 TEAM: Final = "trackers"
 TARGET: Final = "target"
-OTHER: Final = {TEAM: TARGET, TARGET: TEAM}
 OPPONENTS: Final = {TEAM: "target", TARGET: "team"}
 """The setting of a training that names what a side plays against."""
+SCORES: Final = ("score", "safe_score", "contact_free")
+Cell = dict[str, Estimate]
+"""What a team scores against a target, by these names; the last one is the share of episodes without contact."""
 TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
-_FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
+_FREE: Final = ("generations", "responses", "response_steps", "episodes")
 """Settings that the command that resumes a league may change."""
 _STEPS: Final = (1, 10**12)
 _COLUMNS: Final = 4  # of targets, which fit into 80 characters
@@ -127,30 +126,19 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """What a team scores against a target: score and safe score of the team, share of episodes without contact."""
-
-    team: str
-    target: str
-    score: Estimate
-    safe_score: Estimate
-    contact_free: Estimate
-
-
-@dataclass(frozen=True)
 class Exploited:
     """What a best response gains against a member: by how much it moves the team's score in its own favour.
 
     Attributes:
-        side: The member's side.
         label: The member's label.
+        opponent: Label of the strongest opponent of the league.
         gain: Of the best response.
-        before: The member's play against the strongest opponent of the league.
+        before: The member's play against that opponent.
         after: Its play against the best response.
     """
 
-    side: str
     label: str
+    opponent: str
     gain: float
     before: Cell
     after: Cell
@@ -163,19 +151,15 @@ class League:
         self.settings, self.console = settings, console
         self.scenario = get_scenario(settings.scenario, **settings.overrides)
         self.teams, self.targets = (self._members(side, settings.generations) for side in (TEAM, TARGET))
-        self.cells: list[Cell] = []
+        self.cells: dict[tuple[str, str], Cell] = {}  # by the labels of team and target
         self.exploited: list[Exploited] = []
-
-    def at(self, team: str, target: str) -> Cell:
-        """Return what a team scores against a target, by their labels."""
-        return next(c for c in self.cells if (c.team, c.target) == (team, target))
 
     def play(self) -> None:
         """Generations, cross-play, best responses."""
         for generation in range(1, self.settings.generations + 1):
             for side in (TARGET, TEAM):
                 self._generation(side, generation)
-        self.cells = [self._cell(team, target) for team in self.teams for target in self.targets]
+        self.cells = {(a.label, b.label): self._cell(a, b) for a in self.teams for b in self.targets}
         self._exploit(TARGET, self.teams, self.targets)
         self._exploit(TEAM, self.targets, self.teams)
 
@@ -185,7 +169,7 @@ class League:
         *own, trained = self._members(side, generation)
         if trained.trained:
             return
-        others = self._members(OTHER[side], generation - (side == TARGET))
+        others = self._members(TEAM if side == TARGET else TARGET, generation - (side == TARGET))
         hard = dict.fromkeys((other.policy for other in others), 0.0)
         if s.opponents == "pfsp" and len(others) > 1:
             hard = {other.policy: self._difficulty(side, own[-1], other) for other in others}
@@ -202,10 +186,11 @@ class League:
             best = Member(f"response to {to.label}", str(run / BEST), run)
             if not best.trained:
                 self._train(side, best, to.policy, s.response_steps, others)
-            after, *known = (self._cell(*((to, m) if side == TARGET else (m, to))) for m in (best, *others))
-            before = max(known, key=lambda cell: sign * cell.score.value)
-            gain = sign * (after.score.value - before.score.value)
-            self.exploited.append(Exploited(OTHER[side], to.label, gain, before, after))
+            found = {m.label: self._cell(*((to, m) if side == TARGET else (m, to))) for m in (*others, best)}
+            after = found.pop(best.label)
+            opponent = max(found, key=lambda label: sign * found[label]["score"].value)
+            gain = sign * (after["score"].value - found[opponent]["score"].value)
+            self.exploited.append(Exploited(to.label, opponent, gain, found[opponent], after))
 
     def _members(self, side: str, generations: int) -> list[Member]:
         """Return those of a side that were there at the beginning, and those of its first generations."""
@@ -223,9 +208,6 @@ class League:
         s, run = self.settings, trained.run
         assert run is not None
         self.console.print(f"{trained.label}: {run}", markup=False)
-        if (run / SETTINGS).is_file():
-            train(replace(read_settings(run / SETTINGS), folder=run), console=self.console)
-            return
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
             **default_settings(s.scenario, side=side, preset="residual").to_dict(),
@@ -233,14 +215,13 @@ class League:
             "seed": s.seed,
             "overrides": s.overrides,
             OPPONENTS[side]: opponents,
-            "start": None if start is None else str(start),
+            **({} if start is None else {"start": str(start), "imitate": None}),
             "folder": str(run),
             "evaluate_every": max(1, steps // 4),
             "checkpoint_every": max(1, steps // 8),
             "tensorboard": False,
             "beside": None,
         }
-        values |= {} if start is None else {"imitate": None}
         train(TrainSettings.from_dict({**values, **s.training}), console=self.console)
 
     def _difficulty(self, side: str, own: Member, other: Member) -> float:
@@ -259,10 +240,9 @@ class League:
         path = self.settings.path / "cross-play" / f"{name}-{self.settings.episodes}.json"
         if not path.is_file():
             results = self._play(team, target, self.settings.episodes, TEST_SEED, "test")
-            scores = {name: asdict(results.estimate(name)) for name in ("score", "safe_score", "contact_free")}
             path.parent.mkdir(exist_ok=True)
-            write_atomically(path, (json.dumps(scores, indent=2) + "\n").encode())
-        return Cell(team.label, target.label, *(Estimate(**score) for score in read_json(path).values()))
+            write_json(path, {name: asdict(results.estimate(name)) for name in SCORES})
+        return {name: Estimate(**score) for name, score in read_json(path).items()}
 
     def _play(self, team: Member, target: Member, episodes: int, seed: int, split: str) -> Results:
         self.console.print(f"playing {team.label} against {target.label}", markup=False)
@@ -277,7 +257,7 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
     for target in settings.targets:
         load_target(target)
     with locked(settings.path):
-        hold_settings(settings.path / FILE, settings.to_dict(), _FREE)
+        hold_settings(settings.path / "league.json", settings.to_dict(), _FREE)
         found.play()
         write_results(found)
     return found
@@ -285,7 +265,7 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
 
 def label_of(name: str) -> str:
     """Return how tables name one that was there at the beginning: its name, or that of its file."""
-    return Path(name).stem if Path(name).suffix else name
+    return name if is_code(name) else Path(name).stem
 
 
 def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
@@ -300,19 +280,22 @@ def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
 def write_results(found: League) -> None:
     """Write matrix and summary to the league's folder."""
     folder = found.settings.path
-    with replacing(folder / MATRIX) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with replacing(folder / "matrix.csv") as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
-        for c in found.cells:
-            s = c.score
-            values = [s.value, s.low, s.high, c.safe_score.value, c.contact_free.value]
-            writer.writerow([c.team, c.target, *(f"{v:.4f}" for v in values), s.count])
+        for pair, cell in found.cells.items():
+            score = cell["score"]
+            values = [score.value, score.low, score.high, cell["safe_score"].value, cell["contact_free"].value]
+            writer.writerow([*pair, *(f"{v:.4f}" for v in values), score.count])
     summary = {
         "settings": found.settings.to_dict(),
-        "cells": [asdict(cell) for cell in found.cells],
+        "cells": [
+            {"team": team, "target": target, **{name: asdict(e) for name, e in cell.items()}}
+            for (team, target), cell in found.cells.items()
+        ],
         "exploited": [asdict(one) for one in found.exploited],
     }
-    write_atomically(folder / SUMMARY, (json.dumps(summary, indent=2) + "\n").encode())
+    write_json(folder / "summary.json", summary)
 
 
 def draw_matrix(found: League) -> list[Path]:
@@ -322,7 +305,7 @@ def draw_matrix(found: League) -> list[Path]:
     from posse_training.style import RC, WIDTH, note, plain, save, subplots
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
-    scores = [[found.at(a, b).score for b in targets] for a in teams]
+    scores = [[found.cells[a, b]["score"] for b in targets] for a in teams]
     with mpl.rc_context({**RC, "axes.grid": False}):
         figure, axis = subplots(1, 1, (WIDTH, 1.4 + 0.42 * len(teams)))
         image = axis.imshow([[v.value for v in row] for row in scores], vmin=0, vmax=1, cmap="cividis", aspect="auto")
@@ -350,15 +333,14 @@ def tables(found: League) -> list[Table]:
         for target in part:
             matrix.add_column(target.label)
         for team in found.teams:
-            scores = [found.at(team.label, target.label).score for target in part]
+            scores = [found.cells[team.label, target.label]["score"] for target in part]
             matrix.add_row(team.label, *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
         matrices.append(matrix)
     exploited = Table(
         "member", "strongest opponent so far", "score", "with the response", "gain", title="best responses"
     )
     for e in found.exploited:
-        opponent = e.before.target if e.side == TEAM else e.before.team
-        exploited.add_row(e.label, opponent, str(e.before.score), str(e.after.score), f"{e.gain:+.3f}")
+        exploited.add_row(e.label, e.opponent, str(e.before["score"]), str(e.after["score"]), f"{e.gain:+.3f}")
     return [*matrices, exploited] if found.exploited else matrices
 
 

@@ -102,19 +102,25 @@ Ray = Annotated[bool | str, _words((bool, str), _address, lambda value: [str(val
 
 
 @dataclass(frozen=True, kw_only=True)
-class OneWorld:
-    """One world of a scenario, as all commands name it that show one."""
+class Worlds:
+    """Worlds of a scenario, as all commands name them that play one scenario."""
 
     scenario: str = "smart"
     """Scenario to play."""
     overrides: Changes = field(default_factory=dict)
     """Settings of the scenario to change, such as num_trackers=3 or arena=6,4."""
     seed: int = 7
-    """Seed of the world."""
+    """Seed of the worlds."""
+    split: str = "test"
+    """Split of the worlds: train, validation or test."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneWorld(Worlds):
+    """One of them."""
+
     world: int = 0
     """Index of the world within the seed."""
-    split: str = "test"
-    """Split of the world: train, validation or test."""
 
     @property
     def place(self) -> dict[str, Any]:

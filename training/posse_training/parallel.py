@@ -157,6 +157,15 @@ def on_ray(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> It
             ray.cancel(reference, force=True)
 
 
+def all_on_ray(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Return the results of :func:`on_ray` in the order of the calls; raise one that is an exception."""
+    results = dict(on_ray(function, calls))
+    for result in results.values():
+        if isinstance(result, Exception):
+            raise result
+    return [results[k] for k in range(len(calls))]
+
+
 def _work(function: Callable[..., Any], expected: str, *arguments: Any) -> Any:
     """Return the result of a function, or the exception that it raised: Ray prints those that it is told of."""
     if installed() != expected:

@@ -33,13 +33,18 @@ def commit() -> str | None:
         return None
 
 
+def software(*packages: str) -> dict[str, str]:
+    """Return the versions of posse, Python and some packages."""
+    ours = {"posse": posse.__version__, "python": platform.python_version()}
+    return ours | {name: version(name) for name in packages}
+
+
 @functools.cache
 def installed() -> str:
     """Return the versions that the numbers of an episode depend on, and a digest of posse's sources."""
     ours = "".join(map(sources, ("posse", "posse_baselines", "posse_training")))
-    digest = hashlib.sha256(ours.encode()).hexdigest()[:12]
-    others = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "llvmlite"))
-    return f"posse {posse.__version__} (sources {digest}), Python {platform.python_version()}, {others}"
+    versions = software("numpy", "numba", "llvmlite") | {"sources": hashlib.sha256(ours.encode()).hexdigest()[:12]}
+    return ", ".join(f"{name} {value}" for name, value in versions.items())
 
 
 @functools.cache

@@ -131,9 +131,7 @@ class PosseEnv(EnvBase):
         self.observation_spec = observation.to(self.device)
         self.action_spec = action.to(self.device)
         self.reward_spec = reward.to(self.device)
-        self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(worlds,)).to(
-            self.device
-        )
+        self.done_spec = Composite(terminated=flag, truncated=flag.clone(), shape=(worlds,)).to(self.device)
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""
@@ -190,14 +188,10 @@ class PosseEnv(EnvBase):
         for group, part in self._rows.items():
             size = (*self.batch_size, len(self.group_map[group]))
             packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
-        terminated = self._tensor(self.batch.terminated).unsqueeze(-1)
-        truncated = self._tensor(self.batch.truncated).unsqueeze(-1)
-        packed.set("score", self._tensor(self.batch.score).unsqueeze(-1))
+        for name in ("score", "terminated", "truncated"):  # TorchRL adds "done"
+            packed.set(name, self._tensor(getattr(self.batch, name)).unsqueeze(-1))
         if self._state_layout is not None:
             packed.set("state", self._tensor(self._state_layout.vector(self.batch.arrays)))
-        packed.set("done", terminated | truncated)
-        packed.set("terminated", terminated)
-        packed.set("truncated", truncated)
         return packed
 
     def _tensor(self, array: Any) -> torch.Tensor:

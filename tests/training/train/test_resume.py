@@ -26,7 +26,7 @@ from tests.support.runs import (
     steps_saved,
 )
 
-from posse_training.errors import CheckpointError, RunFolderError
+from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.train import TrainSettings, checkpoint
 from posse_training.train.train import train
@@ -104,7 +104,7 @@ def test_a_damaged_checkpoint(tmp_path: Path) -> None:
     train(small(tmp_path), console=quiet())
     path = tmp_path / "checkpoint.pt"
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.raises(CheckpointError, match=r"checkpoint\.pt is damaged"):
+    with pytest.raises(RunFolderError, match=r"checkpoint\.pt is damaged"):
         resume(tmp_path)
 
 
@@ -143,5 +143,5 @@ def test_a_checkpoint_of_other_settings(tmp_path: Path) -> None:
     settings = json.loads((tmp_path / "settings.json").read_text())
     settings["hidden"] = [8, 8]
     (tmp_path / "settings.json").write_text(json.dumps(settings))
-    with pytest.raises(CheckpointError, match="does not fit"):
+    with pytest.raises(RunFolderError, match="does not fit"):
         resume(tmp_path)

@@ -12,7 +12,7 @@ from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
-from posse_training.errors import CheckpointError, SettingsError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.train import TrainSettings
 from posse_training.train.train import train
 from posse_training.train.validation import validate
@@ -57,7 +57,7 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
     train(second, console=quiet())
     before, after = (numbers(tmp_path / name)["/last/layers.0.weight"] for name in ("first", "second"))
     assert before == after
-    with pytest.raises(CheckpointError, match=r"(?s)do not fit this run.*hidden"):
+    with pytest.raises(RunFolderError, match=r"(?s)do not fit this run.*hidden"):
         train(replace(second, folder=tmp_path / "third", hidden=(8,)), console=quiet())
 
 

@@ -17,7 +17,7 @@ from rich.console import Console
 from posse_training.errors import ClusterError, SettingsError, require
 from posse_training.files import check_held
 from posse_training.options import Names, Ray
-from posse_training.parallel import connected, on_ray
+from posse_training.parallel import all_on_ray, connected
 from posse_training.train.presets import Preset, default_settings
 from posse_training.train.settings import FREE, SETTINGS, TrainSettings, read_settings
 
@@ -93,12 +93,7 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
     if ray is False:
         return [train(settings) for settings in runs]
     with connected(ray, log=True):
-        results = dict(on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs]))
-    paths = [results[k] for k in range(len(runs))]
-    for path in paths:
-        if isinstance(path, Exception):
-            raise path
-    return paths
+        return all_on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs])
 
 
 def train_on_worker(settings: TrainSettings, where: Path) -> Path:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from posse import Family, Scenario
 from posse.scenarios.family import blocks
 from posse_baselines import Policy, Target, batch_for, load, rollout
-from posse_training.errors import TrainedSplitError
+from posse_training.errors import SettingsError
 from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
 
@@ -17,7 +17,7 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
     """Raise if a policy or a target was trained on this split, by its own account."""
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
-        raise TrainedSplitError(
+        raise SettingsError(
             f"{policy.name!r} was trained on the split {split!r}, so that its score there would be "
             "biased: choose another of 'train', 'validation', 'test' than "
             f"{', '.join(map(repr, trained))}"

@@ -19,7 +19,7 @@ from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
-from posse_training.errors import PlayError, SettingsError, TrainedSplitError, describe
+from posse_training.errors import PlayError, SettingsError, describe
 from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
@@ -59,9 +59,8 @@ def evaluate(
         **overrides: Settings of the scenario.
 
     Raises:
-        SettingsError: ``episodes`` below 1.
+        SettingsError: ``episodes`` below 1, or a split that the policy or the target was trained on.
         PolicyError: An unknown policy or target, or one that does not fit.
-        TrainedSplitError: A split that the policy or the target was trained on.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
         MissingExtraError: Ray is to be used and not installed.
         ClusterError: There is no such cluster, or one of its nodes has other versions.
@@ -167,7 +166,7 @@ def played_errors() -> Iterator[None]:
         yield
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
-    except (PlayError, TrainedSplitError, SettingsError, ScenarioError):
+    except (PlayError, SettingsError, ScenarioError):
         raise
     except Exception as error:
         raise PlayError(describe(error)) from None

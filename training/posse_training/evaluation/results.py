@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Family, Scenario
-from posse_baselines.files import write_atomically
+from posse_baselines.files import write_atomically, write_json
 from posse_training.evaluation.statistics import Estimate, mean
 
 Column = npt.NDArray[np.float64]
@@ -90,5 +89,4 @@ class Results:
             "split": self.split,
             "scenario": self.scenario.to_dict(),
         }
-        text_of = json.dumps(settings, indent=2) + "\n"
-        write_atomically(path.with_suffix(".json"), text_of.encode())
+        write_json(path.with_suffix(".json"), settings)

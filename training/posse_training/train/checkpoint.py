@@ -19,7 +19,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines.files import replacing, write_atomically
-from posse_training.errors import CheckpointError
+from posse_training.errors import RunFolderError
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import Point
 
@@ -60,15 +60,15 @@ def read_checkpoint(folder: Path) -> State:
     """Return the state of a folder's checkpoint.
 
     Raises:
-        CheckpointError: There is none, or it is damaged.
+        RunFolderError: There is none, or it is damaged.
     """
     path = folder / CHECKPOINT
     if not path.is_file():
-        raise CheckpointError(f"{folder} has no {CHECKPOINT}: start the training again")
+        raise RunFolderError(f"{folder} has no {CHECKPOINT}: start the training again")
     try:
         state: State = torch.load(path, weights_only=True)
     except Exception as error:  # whatever a damaged file makes torch raise
-        raise CheckpointError(
+        raise RunFolderError(
             f"checkpoint {path} is damaged ({error!s:.100}). The run cannot be resumed from it; the policies in the "
             "folder are separate files"
         ) from error
@@ -85,14 +85,14 @@ def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics
         log_deviation: Exploration starts anew with it.
 
     Raises:
-        CheckpointError: There is no checkpoint, it is damaged, or of other networks or inputs.
+        RunFolderError: There is no checkpoint, it is damaged, or of other networks or inputs.
     """
     state = read_checkpoint(folder)
     try:
         model.policy.load_state_dict(state["model"]["parts"]["policy"])
         statistics.restore(state["statistics"])
     except (KeyError, RuntimeError, TypeError, ValueError) as error:
-        raise CheckpointError(
+        raise RunFolderError(
             f"the networks in {folder} do not fit this run: {error!s:.300}. Train with its hidden, "
             "activation, encoding and algorithm, or leave start out"
         ) from error

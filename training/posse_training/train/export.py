@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import platform
 import sys
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import stable_baselines3
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
-import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_training.provenance import commit
+from posse_training.provenance import commit, software
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import LIMIT, Normaliser
 from posse_training.train.settings import TrainSettings
@@ -73,11 +70,5 @@ def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, floa
         **{
             f"validation_{name}": curve[-1][name] if curve else None for name in ("safe_score", "score", "contact_free")
         },
-        "software": {
-            "python": platform.python_version(),
-            "posse": posse.__version__,
-            "numpy": np.__version__,
-            "torch": torch.__version__,
-            "stable-baselines3": stable_baselines3.__version__,
-        },
+        "software": software("numpy", "torch", "stable-baselines3"),
     }

@@ -15,7 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
-from posse_training.errors import CheckpointError, DivergedError, SettingsError
+from posse_training.errors import DivergedError, RunFolderError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, check_algorithm
@@ -46,8 +46,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     Raises:
         SettingsError: A package that is not installed.
         PolicyError: An unknown policy, or one that cannot be an adviser.
-        RunFolderError: The folder is in use, or holds a run of other settings.
-        CheckpointError: A checkpoint cannot be read.
+        RunFolderError: The folder is in use, holds a run of other settings, or a checkpoint that cannot be read.
         DivergedError: The networks give numbers that are not finite.
     """
     check_before(settings)
@@ -135,7 +134,7 @@ class Run(BaseCallback):
         """Go back to where a checkpoint was written.
 
         Raises:
-            CheckpointError: The checkpoint does not fit the settings.
+            RunFolderError: The checkpoint does not fit the settings.
         """
         try:
             self.env.restore(arrays_of(state["worlds"]))
@@ -145,7 +144,7 @@ class Run(BaseCallback):
             self.at = Progress(**state["progress"])
             self._started -= self.at.seconds
         except Exception as error:  # whatever a state of other settings raises
-            raise CheckpointError(
+            raise RunFolderError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "
                 "Restore settings.json, or start the training again in another --out"
             ) from error
