@@ -74,7 +74,7 @@ DERIVED: Final[_Numbers] = {
     "neighbours": (_I, lambda s: s.neighbours),
     "physics_steps": (_I, lambda s: s.physics_steps),
     "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
-    "outage_steps": (_I, lambda s: max(1, round(s.outage_time / s.control_step))),
+    "outage_steps": (_I, lambda s: s.outage_steps),
     "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
@@ -119,18 +119,20 @@ def _of_pair(name: str, place: int) -> Callable[[Scenario], float]:
     return lambda s: getattr(s, name)[place]
 
 
-def _numbers() -> _Numbers:
-    """Return all numbers that kernels read of a scenario: type and value."""
+def _of_settings() -> _Numbers:
+    """Return the numbers among the settings of a scenario: type and value."""
     numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
         if setting.kind in _NUMERIC:
             numbers[name] = _NUMERIC[setting.kind], attrgetter(name)
         elif setting.kind == "tuple[float, float]":
             numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _of_pair(name, 0)), (_F, _of_pair(name, 1))
-    return {**numbers, **DERIVED}
+    return numbers
 
 
-CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _numbers().items()))
+_NUMBERS: Final = {**_of_settings(), **DERIVED}
+
+CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _NUMBERS.items()))
 """The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
 ``_most``), then :data:`DERIVED`."""
 
@@ -418,7 +420,7 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     config = np.zeros(1, CONFIG)
-    for name, (_, read) in _numbers().items():
+    for name, (_, read) in _NUMBERS.items():
         value = read(scenario)
         config[name] = FAR if value == math.inf else value
     return config

@@ -272,9 +272,10 @@ def observe_together(
         start, size = nonnegative(made.width + c.sonar_beams), nonnegative(made.mate_width + c.message_size)
         for p in range(nonnegative(c.neighbours)):
             mate = _mate_in_place(c, worlds, observers, view, p, s)
-            made.write_mate(c, view, mate, s, rows[:, nonnegative(start + p * size) :])
-        if c.message_size > 0:
-            _write_messages(c, worlds, observers, made, s, rows)
+            place = rows[:, nonnegative(start + p * size) :]
+            made.write_mate(c, view, mate, s, place)
+            if c.message_size > 0:
+                _write_messages(c, worlds, observers, p, s, place[:, nonnegative(made.mate_width) :])
 
 
 @compiled
@@ -353,22 +354,17 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: 
 
 
 @out_of_line
-def _write_messages(
-    c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, rows: FloatArray
-) -> None:
-    """Write the messages of the listed mates: none in an empty place, and none to a target."""
-    size, i = nonnegative(made.mate_width + c.message_size), nonnegative(observers.i)
+def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int, s: Record, rows: FloatArray) -> None:
+    """Write the messages of the mates in a place: none in an empty one, and none to a target."""
+    i = nonnegative(observers.i)
     for lane in range(observers.number):
-        e = nonnegative(observers.e + lane)
-        for p in range(nonnegative(c.neighbours)):
-            number = int(s.placed[p, lane])
-            start = nonnegative(made.width + c.sonar_beams + p * size + made.mate_width)
-            for q in range(nonnegative(c.message_size)):
-                said = ZERO
-                if number >= 0 and i < c.num_trackers:
-                    j = nonnegative(number)
-                    said = worlds.message[e, 0, j, q] if observers.now else worlds.heard_message[e, i, j, q]
-                rows[lane, start + q] = said
+        e, number = nonnegative(observers.e + lane), int(s.placed[p, lane])
+        for q in range(nonnegative(c.message_size)):
+            said = ZERO
+            if number >= 0 and i < c.num_trackers:
+                j = nonnegative(number)
+                said = worlds.message[e, 0, j, q] if observers.now else worlds.heard_message[e, i, j, q]
+            rows[lane, q] = said
 
 
 @compiled
