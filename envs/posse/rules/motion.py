@@ -142,7 +142,7 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
             max_speed=pose.max_speed,
             max_turn_rate=pose.max_turn_rate,
         )
-        write_block(moved, 0, s.new_pose[i : i + WIDTH])
+        write_block(moved, 0, s.new_pose[i:])
     others = False
     for i in range(n):
         t = trackers[i]

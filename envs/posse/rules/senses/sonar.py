@@ -33,14 +33,12 @@ _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
-def echo_of_disc(c: Record, robot: Record, j: int, s: Record) -> None:
-    """Update the sonar readings with disc j.
+def echo_of_disc(c: Record, ahead: np.float32, left: np.float32, radius: np.float32, s: Record) -> None:
+    """Update the sonar readings with a disc, whose place is given in the robot's frame.
 
     A beam that contains the nearest point of the disc reads the distance of that point; another one, the distance at
     which its axis meets the disc. Usually the disc appears narrower than a beam, and no other axis can meet it.
     """
-    radius = s.radius[j]
-    ahead, left = in_frame(s.x[j] - robot.x, s.y[j] - robot.y, robot.heading_cos, robot.heading_sin)
     distance = root(ahead * ahead + left * left)
     if distance - radius >= c.sonar_range + c.robot_radius:
         return
@@ -85,7 +83,7 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
 
     The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    x, y = robot.x, robot.y
+    x, y, cosine, sine = robot.x, robot.y, robot.heading_cos, robot.heading_sin
     for block in range(blocks(c.sonar_beams)):
         store(s.reading, WIDTH * block, eight(c.sonar_range))
     for block in range(blocks(num_discs(c))):
@@ -96,7 +94,8 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
         while near != 0:
             disc = nonnegative(j + lowest_bit(near))
             if disc != number:
-                echo_of_disc(c, robot, disc, s)
+                ahead, left = in_frame(s.x[disc] - x, s.y[disc] - y, cosine, sine)
+                echo_of_disc(c, ahead, left, s.radius[disc], s)
             near &= near - 1
     if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
