@@ -27,7 +27,6 @@ import numpy.typing as npt
 from posse.numeric import Records, compiled
 
 Function = Callable[..., Any]
-Parameters = tuple[str, ...]
 Bound = float | Callable[[Any], float]
 """A number, or a function of the scenario that returns one."""
 Decorator = Callable[[Function], Function]
@@ -52,7 +51,7 @@ def plain(function: Any) -> Any:
     return getattr(function, "py_func", function)
 
 
-def parameters_of(function: Function) -> Parameters:
+def parameters_of(function: Function) -> tuple[str, ...]:
     """Return the names of a function's parameters."""
     return tuple(inspect.signature(plain(function)).parameters)
 
@@ -76,29 +75,58 @@ class Declaration:
 
     Attributes:
         name: Its name.
-        unit: Unit of its value; empty for rules, which have none.
-        meaning: Its docstring.
+        unit: Unit of its value; "-" for rules, which have none.
         function: The function, compiled if kernels call it.
         kind: Name of the kind for messages, such as ``"reward term"``.
-        allowed: The lists of parameters that the function may have.
-        returns: What it returns.
-        further: Names of further functions, each with its parameters and what it returns; ``None`` if it is not given.
+        signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
+            All but ``function`` may be ``None``.
+
+    Raises:
+        DeclarationError: A function has no docstring or other parameters, or another attribute is invalid.
     """
 
     name: str
-    unit: str = ""
-    meaning: str
+    unit: str = "-"
     function: Function
     kind: ClassVar[str]
-    allowed: ClassVar[tuple[Parameters, ...]]
-    returns: ClassVar[str] = "a number"
-    further: ClassVar[Mapping[str, tuple[Parameters, str]]] = {}
+    signatures: ClassVar[Mapping[str, tuple[str, str]]]
+
+    def __post_init__(self) -> None:
+        for attribute, (allowed, _) in self.signatures.items():
+            function = getattr(self, attribute)
+            if attribute == "function" or function is not None:
+                object.__setattr__(self, attribute, self._checked(function, allowed))
+        name: Any = self.name
+        unit: Any = self.unit
+        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
+            raise self.error(f"invalid name {name!r}: use letters, digits, _ and -")
+        if not self.meaning.strip():
+            raise self.error("its docstring, which must state its meaning, is missing")
+        if not isinstance(unit, str) or not unit:
+            raise self.error(f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
+
+    def _checked(self, function: Any, allowed: str) -> Function:
+        """Return a function, compiled if kernels call it; raise DeclarationError if it has other parameters."""
+        if not isinstance(plain(function), FunctionType):
+            raise self.error(f"declare a function, made by def, not a {type(function).__name__}", function)
+        signature = inspect.signature(plain(function))
+        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
+        if given not in allowed.split(" or "):
+            raise self.error(f"its parameters are {given}, not {allowed}", function)
+        working: Function = compiled(plain(function)) if given.startswith("(c") else function
+        return working
+
+    @property
+    def meaning(self) -> str:
+        """Its docstring."""
+        return inspect.getdoc(plain(self.function)) or ""
 
     @property
     def functions(self) -> dict[Function, str]:
         """The functions for compiled code, and what each returns."""
-        further = {getattr(self, name): returns for name, (_, returns) in self.further.items() if getattr(self, name)}
-        return {self.function: self.returns, **further}
+        functions = ((getattr(self, attribute), returns) for attribute, (_, returns) in self.signatures.items())
+        return {function: returns for function, returns in functions if function is not None}
 
     @property
     def built_in(self) -> bool:
@@ -106,7 +134,7 @@ class Declaration:
         return str(plain(self.function).__module__).partition(".")[0] == _PACKAGE
 
     @property
-    def parameters(self) -> Parameters:
+    def parameters(self) -> tuple[str, ...]:
         """Names of the function's parameters."""
         return parameters_of(self.function)
 
@@ -125,9 +153,9 @@ class Declaration:
             raise self.error(f"low={values[0]:g}{of} is above high={values[1]:g} in {scenario.name!r}")
         return values
 
-    def error(self, reason: str, function: Function | None = None) -> DeclarationError:
+    def error(self, reason: str, function: Any = None) -> DeclarationError:
         """Return the error for an invalid declaration, or for one of its further functions."""
-        return _error(self.kind, function or self.function, reason)
+        return DeclarationError(f"{self.kind} {place_of(function or self.function)}: {reason}")
 
 
 D = TypeVar("D", bound=Declaration)
@@ -141,57 +169,32 @@ class Registry(dict[str, D]):
         self.make = make
         self.kind = make.kind
 
-    def decorator(self, first: object, **options: Any) -> Callable[[Function], Function]:
+    def decorator(self, **options: Any) -> Callable[[Function], Function]:
         """Return the decorator that declares a function; raise if the function is its first argument."""
+        first = next(iter(options.values()))
         if callable(first):
-            raise _error(self.kind, first, 'the decorator needs arguments: a unit, such as "1", or a name')
+            reason = 'the decorator needs arguments: a unit, such as "1", or a name'
+            raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
         return lambda function: self.declare(function, **options)
 
-    def declare(self, function: Any, *, name: Any = None, **options: Any) -> Function:
+    def declare(self, function: Function, **options: Any) -> Function:
         """Add the declaration made on a function, and return the function, compiled if kernels call it.
 
         It replaces one that was made on a function of the same module and qualified name.
 
         Args:
             function: The function.
-            name: The declaration's name; default: that of the function.
-            **options: Further attributes of the declaration.
+            **options: Further attributes of the declaration; default of its name: that of the function.
 
         Raises:
-            DeclarationError: The name is invalid or taken, a function has no docstring or other
-                parameters, or an option is invalid.
+            DeclarationError: The declaration is invalid, or its name is taken.
         """
-        self._check(function, *self.make.allowed)
-        for further, (wanted, _) in self.make.further.items():
-            if options[further] is not None:
-                self._check(options[further], wanted)
-                options[further] = compiled(plain(options[further]))
-        name = plain(function).__name__ if name is None else name
-        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
-            raise _error(self.kind, function, f"invalid name {name!r}: use letters, digits, _ and -")
-        taken = self.get(name)
+        made = self.make(function=function, **{"name": getattr(plain(function), "__name__", ""), **options})
+        taken = self.get(made.name)
         if taken is not None and _home(taken.function) != _home(function):
-            raise _error(self.kind, function, f"the name {name!r} is taken by {place_of(taken.function)}")
-        meaning = inspect.getdoc(plain(function)) or ""
-        if not meaning.strip():
-            raise _error(self.kind, function, "its docstring, which must state its meaning, is missing")
-        unit = options.get("unit", "-")
-        if not isinstance(unit, str) or not unit:
-            raise _error(self.kind, function, f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
-        working: Function = compiled(plain(function)) if parameters_of(function)[0] == "c" else function
-        self[name] = self.make(name=name, meaning=meaning, function=working, **options)
-        return working
-
-    def _check(self, function: Any, *allowed: Parameters) -> None:
-        """Raise DeclarationError unless a function has parameters allowed."""
-        if not isinstance(plain(function), FunctionType):
-            raise _error(self.kind, function, f"declare a function, made by def, not a {type(function).__name__}")
-        signature = inspect.signature(plain(function))
-        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
-        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
-        wanted = [f"({', '.join(each)})" for each in allowed]
-        if given not in wanted:
-            raise _error(self.kind, function, f"its parameters are {given}, not {' or '.join(wanted)}")
+            raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
+        self[made.name] = made
+        return made.function
 
     def built_in(self) -> tuple[D, ...]:
         """Return the built-in declarations, in order."""
@@ -207,11 +210,12 @@ class Registry(dict[str, D]):
         return (*self.built_in(), *(each for each in added if not each.built_in))
 
     def __missing__(self, name: str) -> D:
-        raise KeyError(f"{unknown(self.kind, name, self)}. To use a declaration of your own, import its module first")
+        raise KeyError(undeclared(self.kind, name, self))
 
 
-def _error(kind: str, function: Any, reason: str) -> DeclarationError:
-    return DeclarationError(f"{kind} {place_of(function)}: {reason}")
+def undeclared(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the message for a name that is not declared."""
+    return f"{unknown(kind, name, known)}. To use a declaration of your own, import its module first"
 
 
 def _home(function: Function) -> tuple[str, str]:
@@ -243,7 +247,7 @@ class FieldDeclaration(Declaration):
     """A field of any scenario, and the function that computes it."""
 
     kind = "observation field"
-    allowed = (("c",), ("c", "v"), ("c", "v", "m"))
+    signatures: ClassVar = {"function": ("(c) or (c, v) or (c, v, m)", "numbers")}
 
     size: int
     low: Bound
@@ -252,7 +256,8 @@ class FieldDeclaration(Declaration):
     when: Callable[[Any], bool] | None = None
 
     def __post_init__(self) -> None:
-        """Raise DeclarationError if the size is invalid."""
+        """Raise DeclarationError also if the size is invalid."""
+        super().__post_init__()
         if type(self.size) is not int or not 1 <= self.size <= MOST_NUMBERS:
             raise self.error(f"size={self.size!r} must be a whole number from 1 to {MOST_NUMBERS}")
 
@@ -306,7 +311,7 @@ def field(
         size: Number of values that the function returns, at most 256; as a tuple if more than one.
         when: A function (scenario) -> whether its observation has the field; default: always.
     """
-    return FIELDS.decorator(unit, unit=unit, low=low, high=high, unknown=unknown, size=size, when=when)
+    return FIELDS.decorator(unit=unit, low=low, high=high, unknown=unknown, size=size, when=when)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -314,8 +319,7 @@ class RewardTerm(Declaration):
     """One term of the reward; :func:`reward_term` describes the attributes."""
 
     kind = "reward term"
-    allowed = (("c", "w", "t"), ("c", "w"))
-    further: ClassVar = {"target": (("c", "w"), "a number")}
+    signatures: ClassVar = {"function": ("(c, w, t) or (c, w)", "a number"), "target": ("(c, w)", "a number")}
 
     target: Function | None
 
@@ -337,7 +341,7 @@ def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
         target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
             ``(c, w, t)`` is for trackers only.
     """
-    return REWARD_TERMS.decorator(unit, unit=unit, target=target)
+    return REWARD_TERMS.decorator(unit=unit, target=target)
 
 
 _STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
@@ -348,12 +352,15 @@ class Metric(Declaration):
     """One metric of an episode; :func:`metric` describes the attributes."""
 
     kind = "metric"
-    allowed = (("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"), ("s", "w"))
+    signatures: ClassVar = {
+        "function": ("(c, w) or (c, w, t) or (c, w, trackers) or (c, w, trackers, slots) or (s, w)", "a number")
+    }
 
     per: str
 
     def __post_init__(self) -> None:
-        """Raise DeclarationError if the divisor is unknown."""
+        """Raise DeclarationError also if the divisor is unknown."""
+        super().__post_init__()
         if self.per not in tuple(_STEPS):
             raise self.error(f"unknown per={self.per!r}; allowed: {', '.join(_STEPS)}")
 
@@ -404,7 +411,7 @@ def metric(unit: str, *, per: str = "step") -> Decorator:
         per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
             control steps of all working trackers; ``"episode"``: 1.
     """
-    return METRICS.decorator(unit, unit=unit, per=per)
+    return METRICS.decorator(unit=unit, per=per)
 
 
 class Memory(NamedTuple):
@@ -425,16 +432,21 @@ class TargetMotion(Declaration):
     """A motion of the target; its function sets the goal heading. :func:`target_motion` describes the attributes."""
 
     kind = "target motion"
-    allowed = tuple(("c", "w", "trackers", "obstacles", "s")[:count] for count in (2, 3, 4, 5))
-    returns = "nothing"
-    further: ClassVar = {"draw": (("c", "w"), "nothing")}
+    signatures: ClassVar = {
+        "function": (
+            "(c, w) or (c, w, trackers) or (c, w, trackers, obstacles) or (c, w, trackers, obstacles, s)",
+            "nothing",
+        ),
+        "draw": ("(c, w)", "nothing"),
+    }
 
     draw: Function | None
     memory: Sequence[Memory]
     mirrored: bool
 
     def __post_init__(self) -> None:
-        """Raise DeclarationError if an option has a wrong type, or a memory an invalid name."""
+        """Raise DeclarationError also if an option has a wrong type, or a memory an invalid name."""
+        super().__post_init__()
         given: Any = self.memory
         if not isinstance(self.mirrored, bool):
             raise self.error(f"mirrored={self.mirrored!r} must be True or False")
@@ -470,7 +482,7 @@ def target_motion(
         DeclarationError: The name is taken, the docstring is missing, or an argument or the
             parameters of a function are wrong.
     """
-    return TARGET_MOTIONS.decorator(name, name=name, draw=draw, memory=memory, mirrored=mirrored)
+    return TARGET_MOTIONS.decorator(name=name, draw=draw, memory=memory, mirrored=mirrored)
 
 
 FIX_KINDS: Final = ("position", "bearing")
@@ -484,15 +496,17 @@ class Sensor(Declaration):
     """
 
     kind = "sensor"
-    allowed = (("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))
-    returns = "True or False"
-    further: ClassVar = {"measure": (("c", "w", "number", "dx", "dy"), "2 numbers")}
+    signatures: ClassVar = {
+        "function": ("(c, w, t, dx, dy) or (c, w, t, dx, dy, s)", "True or False"),
+        "measure": ("(c, w, number, dx, dy)", "2 numbers"),
+    }
 
     measure: Function | None
     fix: str
 
     def __post_init__(self) -> None:
-        """Raise DeclarationError if there is no such kind of fix."""
+        """Raise DeclarationError also if there is no such kind of fix."""
+        super().__post_init__()
         if self.fix not in FIX_KINDS:
             raise self.error(f"unknown fix={self.fix!r}; allowed: {', '.join(FIX_KINDS)}")
 
@@ -522,7 +536,7 @@ def sensor(name: str, *, measure: Function | None = None, fix: str = "position")
         DeclarationError: The name is taken, the docstring is missing, the parameters are others, or
             there is no such kind.
     """
-    return SENSORS.decorator(name, name=name, measure=measure, fix=fix)
+    return SENSORS.decorator(name=name, measure=measure, fix=fix)
 
 
 FIELDS: Final = Registry(FieldDeclaration)

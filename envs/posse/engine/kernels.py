@@ -17,7 +17,20 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import RewardTerm
-from posse.numeric import ONE, UNCOMPILED, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
+from posse.numeric import (
+    ONE,
+    UNCOMPILED,
+    WIDTH,
+    ZERO,
+    BoolArray,
+    FloatArray,
+    Record,
+    Records,
+    compiled,
+    fetch,
+    kernel,
+    stamp,
+)
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults, draw_coming_faults
@@ -26,12 +39,13 @@ from posse.rules.randomness import mix
 from posse.rules.score import occupy, settle
 from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
+from posse.rules.senses.sonar import listen
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import RULES, WorldArrays, beam_directions, config_record, scratch_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
-from posse.signals.views import OBSERVING, TOGETHER, Generated, observe_sonar, observe_together
+from posse.signals.views import OBSERVING, Generated, observe_together
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
@@ -160,7 +174,7 @@ def advance_worlds(first: int, count: int, through: Pass, made: Generated, scrat
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most TOGETHER. The scratch memory must be initialised by
+    ``count`` is at most WIDTH. The scratch memory must be initialised by
     :func:`posse.rules.discs.lay_out_constants`.
     """
     tables, worlds, actions, results = through.tables, through.worlds, through.actions, through.results
@@ -204,7 +218,7 @@ def advance_worlds(first: int, count: int, through: Pass, made: Generated, scrat
         results.terminated[e] = w.terminated != 0
         results.truncated[e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe_sonar(c, w, trackers, scratch, observations, made.width)
+        listen(c, w, trackers, scratch, observations, made.width)
     observe_together(c, worlds, first, count, made, scratch, results.observations)
     return over
 
@@ -244,8 +258,8 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
             lay_out_constants(fixed.tables.config[0], fixed.tables.beams, s)
             s.prepared[0] = ONE
         over = 0
-        for e in range(nonnegative(first), end, TOGETHER):
-            over += advance_worlds(e, min(TOGETHER, end - e), through, made, s)
+        for e in range(nonnegative(first), end, WIDTH):
+            over += advance_worlds(e, min(WIDTH, end - e), through, made, s)
         return over
 
     return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.error import ResetNeeded
 
 from posse.engine.batch import Batch
 from posse.rendering.style import TRACKER, Colour
@@ -30,9 +29,8 @@ class Scene:
     def __init__(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> None:
         if not 0 <= world < batch.num_worlds:
             raise ValueError(f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}")
+        batch.check_started("draw")
         of = {name: array[world] for name, array in batch.state.items()}
-        if of["world_heading_cos"] == 0 and of["world_heading_sin"] == 0:
-            raise ResetNeeded("nothing to draw before reset: call reset() first")
         s, n = batch.scenario, batch.scenario.num_trackers
         if colours is not None and len(colours) != n:
             raise ValueError(f"{len(colours)} colours do not fit {n} trackers: give one for each")
@@ -58,8 +56,7 @@ class Scene:
         self.broken = of["tracker_broken_at"] != NEVER  # (N,)
         self.sees = of["tracker_sees"] != 0  # (N,) its own sensor sees the target
         since = self.step - of["tracker_sensor_dead_from"].astype(np.int64)
-        outage = max(1, round(s.outage_time / s.control_step))
-        self.senses = ~self.broken & ((since < 0) | (since >= outage))  # (N,) its sensor works
+        self.senses = ~self.broken & ((since < 0) | (since >= s.outage_steps))  # (N,) its sensor works
         self.struck = of["tracker_onsets"] > 0  # (N,) a contact began in this step
         self.colours = (TRACKER,) * n if colours is None else tuple(colours)
         heard = np.zeros((n, n), np.bool_)  # just now; nobody where the radio is perfect

@@ -30,6 +30,7 @@ from posse.numeric import (
     store,
     transpose,
 )
+from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, DISCS, NO_BITS, POSE, ROBOTS, Pose
 
 TOUCHING_GAP: Final = np.float32(0.001)
@@ -109,18 +110,25 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 
 @compiled
-def store_rows(block: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
-    """Inverse of :func:`columns`: write eight numbers per record."""
+def write_block(block: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
+    """Write eight columns, the first of them column ``first``, to at most eight rows."""
     a, b, c, d, e, f, g, h = block
     a, b, c, d, e, f, g, h = transpose((a, b, c, d, e, f, g, h))
-    store(row, at, a)
-    store(row, at + WIDTH, b)
-    store(row, at + 2 * WIDTH, c)
-    store(row, at + 3 * WIDTH, d)
-    store(row, at + 4 * WIDTH, e)
-    store(row, at + 5 * WIDTH, f)
-    store(row, at + 6 * WIDTH, g)
-    store(row, at + 7 * WIDTH, h)
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, first, rows)
+    _write_row(b, 1, first, rows)
+    _write_row(c, 2, first, rows)
+    _write_row(d, 3, first, rows)
+    _write_row(e, 4, first, rows)
+    _write_row(f, 5, first, rows)
+    _write_row(g, 6, first, rows)
+    _write_row(h, 7, first, rows)
+
+
+@compiled
+def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
+    if lane < len(rows):
+        store(rows[lane], first, row)
 
 
 @compiled
@@ -193,8 +201,7 @@ def find_slots(c: Record, w: Record, first: int, slots: Records, taken: np.uint6
 
     ``taken`` is a bit set; the result is -1 if all slots are taken.
     """
-    dx, dy = load(s.x, first) - w.x, load(s.y, first) - w.y
-    ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    ahead, left = in_frame(load(s.x, first) - w.x, load(s.y, first) - w.y, w.frame_cos, w.frame_sin)
     nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
     for slot in range(nonnegative(c.num_trackers)):
         if taken & (BIT << np.uint64(slot)) == NO_BITS:

@@ -54,6 +54,12 @@ def turned(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes
 
 
 @compiled
+def in_frame(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a vector in the frame of a heading: ahead, and to the left. Inverse of :func:`turned`."""
+    return x * cosine + y * sine, y * cosine - x * sine
+
+
+@compiled
 def approach(value: Lanes, wanted: Lanes, most: np.float32) -> Lanes:
     """Return ``value`` moved towards ``wanted`` by at most ``most``; a number, or lanes."""
     return lesser(greater(wanted, value - most), value + most)

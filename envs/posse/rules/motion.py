@@ -30,7 +30,7 @@ from posse.numeric import (
     store_fields,
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import FAR, blocks, columns, nonnegative, store_rows
+from posse.rules.discs import FAR, blocks, columns, nonnegative, write_block
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.randomness import DRIFT, normal_pair
 from posse.rules.state import NEVER, POSE, Pose, WorldArrays
@@ -142,13 +142,13 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
             max_speed=pose.max_speed,
             max_turn_rate=pose.max_turn_rate,
         )
-        store_rows(moved, s.new_pose, WIDTH * i)
+        write_block(moved, 0, s.new_pose[i:])
     others = False
     for i in range(n):
         t = trackers[i]
         if t.broken_at == NEVER:
             if t.near == 0:
-                store_fields(t, POSE, load(s.new_pose, WIDTH * i))
+                store_fields(t, POSE, load(s.new_pose[i], 0))
             else:
                 others = True
     return others

@@ -11,14 +11,14 @@ import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
 from posse.rules.discs import blocks, find_slots, nonnegative
+from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NEVER, NO_BITS
 
 
 @compiled
 def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
     """Return a tracker's position in the slot frame, (ahead, left) of the target, m."""
-    dx, dy = t.x - w.x, t.y - w.y
-    return dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    return in_frame(t.x - w.x, t.y - w.y, w.frame_cos, w.frame_sin)
 
 
 @compiled
@@ -68,7 +68,7 @@ def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
     most = reach + c.slots_reach
     if dx * dx + dy * dy > most * most:
         return False
-    ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    ahead, left = in_frame(dx, dy, w.frame_cos, w.frame_sin)
     for slot in range(c.num_trackers):
         sx, sy = ahead - slots[slot].x, left - slots[slot].y
         if sx * sx + sy * sy <= reach * reach:

@@ -74,7 +74,7 @@ DERIVED: Final[_Numbers] = {
     "neighbours": (_I, lambda s: s.neighbours),
     "physics_steps": (_I, lambda s: s.physics_steps),
     "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
-    "outage_steps": (_I, lambda s: max(1, round(s.outage_time / s.control_step))),
+    "outage_steps": (_I, lambda s: s.outage_steps),
     "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
@@ -119,20 +119,103 @@ def _of_pair(name: str, place: int) -> Callable[[Scenario], float]:
     return lambda s: getattr(s, name)[place]
 
 
-def _numbers() -> _Numbers:
-    """Return all numbers that kernels read of a scenario: type and value."""
+def _of_settings() -> _Numbers:
+    """Return the numbers among the settings of a scenario: type and value."""
     numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
         if setting.kind in _NUMERIC:
             numbers[name] = _NUMERIC[setting.kind], attrgetter(name)
         elif setting.kind == "tuple[float, float]":
             numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _of_pair(name, 0)), (_F, _of_pair(name, 1))
-    return {**numbers, **DERIVED}
+    return numbers
 
 
-CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _numbers().items()))
+_NUMBERS: Final = {**_of_settings(), **DERIVED}
+
+CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _NUMBERS.items()))
 """The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
 ``_most``), then :data:`DERIVED`."""
+
+# Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
+
+
+class Pose(NamedTuple):
+    """Pose, motion and limits of eight trackers."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    max_speed: Lanes  # its own limits, from the scenario
+    max_turn_rate: Lanes
+
+
+class TargetPose(NamedTuple):
+    """Pose and motion of the target of eight worlds, and two whole numbers."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    step: Lanes  # control steps since the start
+    in_contact: Lanes  # 1: it is an agent, and touches anything
+
+
+class Condition(NamedTuple):
+    """Whole numbers of eight trackers."""
+
+    broken_at: Lanes  # control step at which it broke, NEVER while it works
+    sensor_dead_from: Lanes  # start of outages of outage_time
+    radio_dead_from: Lanes
+    sees: Lanes  # 1: its sensor sees the target
+    near: Lanes  # 1: something may touch it in the next step
+    touching: Lanes  # 1: it touches anything
+    onsets: Lanes  # contacts that began in this step
+    fix_step: Lanes  # when its best fix was taken; -1: none yet
+
+
+class Fix(NamedTuple):
+    """The fixes of eight trackers, in the common frame; a sensor of bearings gives the first two alone."""
+
+    x: Lanes  # where the target was, m; a bearing: a unit vector
+    y: Lanes
+    cos: Lanes  # its heading; a bearing: 0
+    sin: Lanes
+    frame_cos: Lanes  # the slot frame ψ; a bearing: 0
+    frame_sin: Lanes
+    vx: Lanes  # m/s, from successive fixes
+    vy: Lanes
+
+
+class Heard(NamedTuple):
+    """The last messages that eight trackers received from a team-mate; its motion as in :class:`Pose`."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    step: Lanes  # when it was sent; -1: never heard
+    unused: Lanes  # makes a block of eight
+
+
+class Odometry(NamedTuple):
+    """How far the own poses of eight trackers, as they know them, are from the true ones."""
+
+    x: Lanes  # m
+    y: Lanes
+    cos: Lanes  # of the heading's error
+    sin: Lanes
+    heading: Lanes  # rad
+    unused_1: Lanes  # make a block of eight
+    unused_2: Lanes
+    unused_3: Lanes
+
 
 _WORLD: Final = (
     ("seed", _U),  # as given by the user
@@ -140,16 +223,9 @@ _WORLD: Final = (
     ("index", np.int64),  # number of the world within the seed
     ("episode", np.int64),  # number of the episode within the world
     ("key", _U),  # key of the episode's random draws
-    ("step", _I),  # control steps since the start
     ("over", _I),  # 1: the episode has ended, the world must be reset
     ("terminated", _I),
-    # the target; kernels also read its pose to the slot frame at once (TARGET_POSE)
-    ("x", _F),
-    ("y", _F),
-    ("heading_cos", _F),
-    ("heading_sin", _F),
-    ("speed", _F),
-    ("turn_rate", _F),
+    *((name, _I if name in ("step", "in_contact") else _F) for name in TargetPose._fields),
     ("frame_cos", _F),
     ("frame_sin", _F),  # the slot frame, ψ
     ("goal_cos", _F),
@@ -195,74 +271,6 @@ def world_record_of(motions: tuple[TargetMotion, ...], metrics: tuple[Metric, ..
                 raise motion.error(f"a world has a field {memory.name!r}: choose another name for this memory")
             fields[memory.name] = _F
     return record_type(*fields.items())
-
-
-# Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
-
-
-class Pose(NamedTuple):
-    """Pose, motion and limits of eight trackers."""
-
-    x: Lanes
-    y: Lanes
-    heading_cos: Lanes
-    heading_sin: Lanes
-    speed: Lanes
-    turn_rate: Lanes
-    max_speed: Lanes  # its own limits, from the scenario
-    max_turn_rate: Lanes
-
-
-class Condition(NamedTuple):
-    """Whole numbers of eight trackers."""
-
-    broken_at: Lanes  # control step at which it broke, NEVER while it works
-    sensor_dead_from: Lanes  # start of outages of outage_time
-    radio_dead_from: Lanes
-    sees: Lanes  # 1: its sensor sees the target
-    near: Lanes  # 1: something may touch it in the next step
-    touching: Lanes  # 1: it touches anything
-    onsets: Lanes  # contacts that began in this step
-    fix_step: Lanes  # when its best fix was taken; -1: none yet
-
-
-class Fix(NamedTuple):
-    """The fixes of eight trackers, in the common frame; a sensor of bearings gives the first two alone."""
-
-    x: Lanes  # where the target was, m; a bearing: a unit vector
-    y: Lanes
-    cos: Lanes  # its heading; a bearing: 0
-    sin: Lanes
-    frame_cos: Lanes  # the slot frame ψ; a bearing: 0
-    frame_sin: Lanes
-    vx: Lanes  # m/s, from successive fixes
-    vy: Lanes
-
-
-class Heard(NamedTuple):
-    """The last messages that eight trackers received from a team-mate."""
-
-    x: Lanes
-    y: Lanes
-    heading_cos: Lanes
-    heading_sin: Lanes
-    speed: Lanes
-    turn_rate: Lanes
-    step: Lanes  # when it was sent; -1: never heard
-    unused: Lanes  # makes a block of eight
-
-
-class Odometry(NamedTuple):
-    """How far the own poses of eight trackers, as they know them, are from the true ones."""
-
-    x: Lanes  # m
-    y: Lanes
-    cos: Lanes  # of the heading's error
-    sin: Lanes
-    heading: Lanes  # rad
-    unused_1: Lanes  # make a block of eight
-    unused_2: Lanes
-    unused_3: Lanes
 
 
 FIX_RECORD: Final = record_type(*((name, _F) for name in Fix._fields))
@@ -314,7 +322,7 @@ def _begin(record: np.dtype[Any], name: str) -> int:
     return int(fields[name][1])
 
 
-TARGET_POSE: Final = _begin(record_type(*_WORLD), "x")
+TARGET_POSE: Final = _begin(record_type(*_WORLD), TargetPose._fields[0])
 POSE: Final = _begin(TRACKER, Pose._fields[0])
 CONDITION: Final = _begin(TRACKER, Condition._fields[0])
 FIX: Final = _begin(TRACKER, "fix")
@@ -412,14 +420,14 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     config = np.zeros(1, CONFIG)
-    for name, (_, read) in _numbers().items():
+    for name, (_, read) in _NUMBERS.items():
         value = read(scenario)
         config[name] = FAR if value == math.inf else value
     return config
 
 
-Fields = tuple[tuple[str, int], ...]
-"""Names and lengths."""
+Fields = tuple[tuple[str, int | tuple[int, ...]], ...]
+"""Names and shapes."""
 
 TEAM: Final = MAX_TRACKERS
 ROBOTS: Final = TEAM + WIDTH
@@ -449,7 +457,7 @@ RULES: Final[Fields] = (
     ("worth", 2 * WIDTH),  # value of each direction considered by a smart target
     ("wanted_speed", TEAM),  # commanded by each tracker's action
     ("wanted_turn", TEAM),
-    ("new_pose", WIDTH * TEAM),  # eight numbers for each tracker
+    ("new_pose", (TEAM, WIDTH)),  # of each tracker
     ("near", ROBOTS),  # numbers of the robots that are near anything, the target last
     ("near_x", ROBOTS + WIDTH),  # their positions
     ("near_y", ROBOTS + WIDTH),
@@ -457,10 +465,10 @@ RULES: Final[Fields] = (
 """What the rules need of it."""
 
 
-def scratch_record(*fields: tuple[str, int]) -> np.dtype[Any]:
+def scratch_record(*fields: tuple[str, int | tuple[int, ...]]) -> np.dtype[Any]:
     """Return the record of scratch memory, of whole cache lines, so that no two threads write to one."""
-    padding = -sum(length for _, length in fields) % _LINE
-    return np.dtype((np.record, [(name, np.float32, (length,)) for name, length in (*fields, ("padding", padding))]))
+    padding = -sum(math.prod(np.atleast_1d(shape)) for _, shape in fields) % _LINE
+    return np.dtype((np.record, [(name, _F, np.atleast_1d(shape)) for name, shape in (*fields, ("padding", padding))]))
 
 
 def new_scratch(record: np.dtype[Any], threads: int) -> Records:

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
+from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, undeclared, unknown
 from posse.scenarios.setting import (
     FAR,
     FARTHEST,
@@ -257,10 +257,7 @@ class Scenario:
     @functools.cache
     def settings() -> Mapping[str, Setting]:
         """Return the declaration of every field by name: unit, range, meaning."""
-        return {
-            field.name: dataclasses.replace(field.metadata["setting"], kind=field.type)
-            for field in dataclasses.fields(Scenario)
-        }
+        return {field.name: field.metadata["setting"](kind=field.type) for field in dataclasses.fields(Scenario)}
 
     @property
     def tracker_speeds(self) -> tuple[float, ...]:
@@ -291,6 +288,11 @@ class Scenario:
     def duration(self) -> float:
         """Length of an episode, s."""
         return self.horizon * self.control_step
+
+    @property
+    def outage_steps(self) -> int:
+        """Control steps of an outage."""
+        return max(1, round(self.outage_time / self.control_step))
 
     @property
     def num_agents(self) -> int:
@@ -476,6 +478,6 @@ def _in_declarations(s: Scenario) -> _Conflicts:
     ):
         for name in names:
             if name not in known:
-                yield where, f"{unknown(kind, name, known)}. To use a declaration of your own, import its module first"
+                yield where, undeclared(kind, name, known)
     for name in (name for name in s.extra_fields if FIELDS[name].built_in):
         yield "extra_fields", f"{name!r} is in every observation: leave it out"

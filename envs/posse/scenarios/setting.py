@@ -5,11 +5,11 @@ Also the limits of all scenarios, including those of float32.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import reprlib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from numbers import Integral, Real
 from typing import Any, Final, NoReturn
 
@@ -86,7 +86,7 @@ class Setting:
     above: bool = False
     infinite: bool = False
     choices: Iterable[str] | None = None
-    kind: str = ""
+    kind: str = field(kw_only=True)
 
     @property
     def range(self) -> str:
@@ -173,7 +173,5 @@ class Setting:
 
 
 def setting(default: Any, meaning: str, *declared: Any, compare: bool = True, **more: Any) -> Any:
-    """Return a dataclass field with this default and declaration; see :class:`Setting`."""
-    return dataclasses.field(
-        default=default, compare=compare, metadata={"setting": Setting(meaning, *declared, **more)}
-    )
+    """Return a dataclass field with this default and declaration, :class:`Setting` but for its kind."""
+    return field(default=default, compare=compare, metadata={"setting": partial(Setting, meaning, *declared, **more)})

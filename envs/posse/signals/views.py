@@ -38,15 +38,13 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import FAR, TOUCHING_GAP, columns, nonnegative, surroundings_within
-from posse.rules.kinematics import turned
-from posse.rules.senses.sonar import ping
+from posse.rules.discs import FAR, columns, nonnegative
+from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (
     CONDITION,
     FIX,
     MESSAGE,
     NEVER,
-    NO_BITS,
     POSE,
     TARGET_POSE,
     TEAM,
@@ -56,20 +54,17 @@ from posse.rules.state import (
     Heard,
     Odometry,
     Pose,
+    TargetPose,
     WorldArrays,
 )
 
 OBSERVING: Final[Fields] = (
     # Eight numbers, one for each of eight worlds.
     ("column", WIDTH),  # of observations
-    ("steps", WIDTH),  # control steps
-    ("target_touching", WIDTH),  # 1: the target touches anything
-    # Eight numbers for each tracker.
-    ("team_x", WIDTH * TEAM),
-    ("team_y", WIDTH * TEAM),
-    # Eight numbers for each place of a team-mate.
-    ("placed", WIDTH * TEAM),  # number of the team-mate; -1: none
-    ("placed_at", WIDTH * TEAM),  # its distance, m
+    ("team_x", (TEAM, WIDTH)),  # of each tracker
+    ("team_y", (TEAM, WIDTH)),
+    ("placed", (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
+    ("placed_at", (TEAM, WIDTH)),  # its distance, m
 )
 """Fields of a thread's scratch memory used by observations (:mod:`posse.rules.state`)."""
 
@@ -80,12 +75,8 @@ class Observers(NamedTuple):
     e: int
     i: int
     number: int
-
-
-@compiled
-def world_of(observers: Observers, lane: int) -> int:
-    """Return the world of a lane."""
-    return nonnegative(observers.e + min(lane, observers.number - 1))
+    now: bool
+    """Whether they know their team-mates as they are now, not as last heard."""
 
 
 @compiled
@@ -149,7 +140,7 @@ class View(NamedTuple):
 @compiled
 def ego(v: View, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     """Return a vector of the common frame in the robot's frame: ahead, and to the left."""
-    return x * v.heading_cos + y * v.heading_sin, y * v.heading_cos - x * v.heading_sin
+    return in_frame(x, y, v.heading_cos, v.heading_sin)
 
 
 class Mate(NamedTuple):
@@ -175,27 +166,8 @@ class Mate(NamedTuple):
 
 
 @compiled
-def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s: Record) -> None:
-    """Write what all agents of ``count`` worlds, at most eight, need: positions, control steps, contacts of targets."""
-    n = nonnegative(c.num_trackers)
-    observers = Observers(first, n, count)
-    for i in range(n):
-        pose = Pose(*of_worlds(worlds.tracker[:, i], observers, POSE))
-        store(s.team_x, WIDTH * i, pose.x)
-        store(s.team_y, WIDTH * i, pose.y)
-    for lane in range(WIDTH):
-        e = world_of(observers, lane)
-        w = worlds.world[e]
-        s.steps[lane] = np.float32(w.step)
-        if c.target_agent != 0:
-            reach, obstacles = c.robot_radius + TOUCHING_GAP, worlds.obstacle[e]
-            touching = w.touching != NO_BITS or surroundings_within(c, obstacles, w.x, w.y, reach)
-            s.target_touching[lane] = np.float32(touching)
-
-
-@compiled
-def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
-    """Return the view of a robot of eight worlds; requires :func:`lay_out_observers`."""
+def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: TargetPose) -> View:
+    """Return the view of a robot of eight worlds."""
     i = nonnegative(observers.i)
     if i < c.num_trackers:
         number = eight(np.float32(i))
@@ -212,10 +184,10 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> 
         per_acceleration, per_turn_acceleration = c.per_acceleration, c.per_turn_acceleration
     else:  # a target agent: its limits act at once, and it has no target
         zero, number = eight(ZERO), eight(-ONE)
-        x, y, cos, sin, speed, turn_rate, _, _ = of_worlds(worlds.world, observers, TARGET_POSE)
+        x, y, cos, sin, speed, turn_rate, _, _ = target
         own = Pose(x, y, cos, sin, speed, turn_rate, eight(c.target_speed), eight(c.target_turn_rate))
         fix = Fix(zero, zero, zero, zero, zero, zero, zero, zero)
-        touching, sees, fixed_at = load(s.target_touching, 0), zero, number
+        touching, sees, fixed_at = counts(target.in_contact), zero, number
         working = eight(ONE)
         per_acceleration = per_turn_acceleration = ZERO
     dx, dy = fix.x, fix.y
@@ -231,7 +203,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> 
         turn_rate=own.turn_rate,
         touching=touching,
         working=working,
-        step=load(s.steps, 0),
+        step=counts(target.step),
         max_speed=own.max_speed,
         max_turn_rate=own.max_turn_rate,
         acceleration_time=own.max_speed * per_acceleration,
@@ -280,110 +252,84 @@ class Generated(NamedTuple):
     """Length of a team-mate's part, without its message."""
 
 
-TOGETHER: Final = WIDTH
-"""Worlds processed together."""
-
-
 @compiled
 def observe_together(
     c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
     """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
     n = nonnegative(c.num_trackers)
-    lay_out_observers(c, worlds, first, count, s)
+    for i in range(n):
+        pose = Pose(*columns(worlds.tracker[:, i], first, first + count, POSE))
+        store(s.team_x[i], 0, pose.x)
+        store(s.team_y[i], 0, pose.y)
+    target = TargetPose(*columns(worlds.world, first, first + count, TARGET_POSE))
     for i in range(n + 1 if c.target_agent != 0 else n):
-        observers = Observers(first, i, count)
-        view = view_of(c, worlds, observers, s)
+        observers = Observers(first, i, count, c.perfect_radio != 0 or i == n)
+        view = view_of(c, worlds, observers, target)
         rows = observations[first : first + count, i]
         made.write_own(c, view, s, rows)
-        now = c.perfect_radio != 0 or i == n
-        _list_nearest(c, worlds, observers, view, now, s)
+        _list_nearest(c, worlds, observers, view, s)
         start, size = nonnegative(made.width + c.sonar_beams), nonnegative(made.mate_width + c.message_size)
         for p in range(nonnegative(c.neighbours)):
-            mate = _mate_in_place(c, worlds, observers, view, p, now, s)
-            made.write_mate(c, view, mate, s, rows[:, nonnegative(start + p * size) :])
-        if c.message_size > 0:
-            _write_messages(c, worlds, observers, made, s, rows)
+            mate = _mate_in_place(c, worlds, observers, view, p, s)
+            place = rows[:, nonnegative(start + p * size) :]
+            made.write_mate(c, view, mate, s, place)
+            if c.message_size > 0:
+                _write_messages(c, worlds, observers, p, s, place[:, nonnegative(made.mate_width) :])
 
 
 @compiled
-def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
-    """Write the sonar of every agent of a world to (rows, F), from ``first`` on.
-
-    Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
-    """
-    n = nonnegative(c.num_trackers)
-    for i in range(n):
-        t = trackers[i]
-        pose = (t.x, t.y, t.heading_cos, t.heading_sin)
-        ping(c, pose, i, s, observations[i], first)
-    if c.target_agent != 0:
-        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, s, observations[n], first)
-
-
-@compiled
-def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, now: bool, s: Record) -> None:
+def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
-    n, places = nonnegative(c.num_trackers), nonnegative(c.neighbours)
+    n, places, i = nonnegative(c.num_trackers), nonnegative(c.neighbours), nonnegative(observers.i)
     for p in range(places):
-        store(s.placed, WIDTH * p, eight(-ONE))
-        store(s.placed_at, WIDTH * p, eight(FAR))
+        store(s.placed[p], 0, eight(-ONE))
+        store(s.placed_at[p], 0, eight(FAR))
     if places == 0:
         return
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
         if j == observers.i:
             continue
-        if now:
-            x, y, known = load(s.team_x, WIDTH * j), load(s.team_y, WIDTH * j), v.step >= ZERO
+        j = nonnegative(j)
+        if observers.now:
+            x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
-            x, y, known = _heard(c, worlds, observers, v, j)
+            heard = Heard(*of_worlds(worlds.heard[:, i, j], observers, MESSAGE))
+            x, y, sent = heard.x, heard.y, counts(heard.step)
+            known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
         ahead, left = ego(v, x - v.x, y - v.y)
         number = choose(known, np.float32(j), -ONE)
         distance = choose(known, root(ahead * ahead + left * left), FAR)
-        if bits(distance <= load(s.placed_at, WIDTH * (places - 1))) == 0:
+        if bits(distance <= load(s.placed_at[nonnegative(places - 1)], 0)) == 0:
             continue
         for p in range(min(n - j, places)):
-            other, whose = load(s.placed_at, WIDTH * p), load(s.placed, WIDTH * p)
+            other, whose = load(s.placed_at[p], 0), load(s.placed[p], 0)
             nearer = distance <= other
-            store(s.placed, WIDTH * p, choose(nearer, number, whose))
-            store(s.placed_at, WIDTH * p, lesser(other, distance))
+            store(s.placed[p], 0, choose(nearer, number, whose))
+            store(s.placed_at[p], 0, lesser(other, distance))
             number, distance = choose(nearer, whose, number), greater(other, distance)
 
 
 @compiled
-def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
-    """Return where mate j was when last heard, and whether that is not forgotten."""
-    heard = Heard(*of_worlds(worlds.heard[:, nonnegative(observers.i), nonnegative(j)], observers, MESSAGE))
-    sent = counts(heard.step)
-    return heard.x, heard.y, (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
-
-
-@compiled
-def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View, p: int, now: bool, s: Record) -> Mate:
+def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View, p: int, s: Record) -> Mate:
     """Return the mate in a place of each observer; in an empty place, number -1 and the data of the first tracker."""
     rows = (
-        _fields_of(worlds, observers, p, now, 0, s),
-        _fields_of(worlds, observers, p, now, 1, s),
-        _fields_of(worlds, observers, p, now, 2, s),
-        _fields_of(worlds, observers, p, now, 3, s),
-        _fields_of(worlds, observers, p, now, 4, s),
-        _fields_of(worlds, observers, p, now, 5, s),
-        _fields_of(worlds, observers, p, now, 6, s),
-        _fields_of(worlds, observers, p, now, 7, s),
+        _fields_of(worlds, observers, p, 0, s),
+        _fields_of(worlds, observers, p, 1, s),
+        _fields_of(worlds, observers, p, 2, s),
+        _fields_of(worlds, observers, p, 3, s),
+        _fields_of(worlds, observers, p, 4, s),
+        _fields_of(worlds, observers, p, 5, s),
+        _fields_of(worlds, observers, p, 6, s),
+        _fields_of(worlds, observers, p, 7, s),
     )
-    fields = transpose(rows)
-    if now:
-        t, age = Pose(*fields), eight(ZERO)
-        x, y, cos, sin, speed, turn_rate = t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate
-    else:
-        h = Heard(*fields)
-        x, y, cos, sin, speed, turn_rate = h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate
-        age = (v.step - counts(h.step)) * c.control_step
-    distance, dx, dy = load(s.placed_at, WIDTH * p), x - v.x, y - v.y
+    x, y, cos, sin, speed, turn_rate, sent, _ = transpose(rows)
+    age = eight(ZERO) if observers.now else (v.step - counts(sent)) * c.control_step
+    distance, dx, dy = load(s.placed_at[p], 0), x - v.x, y - v.y
     ahead, left = ego(v, dx, dy)
     apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
     return Mate(
-        number=load(s.placed, WIDTH * p),
+        number=load(s.placed[p], 0),
         age=age,
         dx=dx,
         dy=dy,
@@ -398,52 +344,27 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
 
 
 @compiled
-def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lane: int, s: Record) -> Lanes:
-    """Return eight fields of a lane's mate in a place: now, or as last heard."""
-    e, j = world_of(observers, lane), nonnegative(max(int(s.placed[WIDTH * p + lane]), 0))
-    if now:
+def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: Record) -> Lanes:
+    """Return eight fields of a lane's mate in a place, of :class:`Pose` or of :class:`Heard`, which begins alike."""
+    e = nonnegative(observers.e + min(lane, observers.number - 1))
+    j = nonnegative(max(int(s.placed[p, lane]), 0))
+    if observers.now:
         return load_fields(worlds.tracker[e, j], POSE)
     return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
 
 
 @out_of_line
-def _write_messages(
-    c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, rows: FloatArray
-) -> None:
-    """Write the messages of the listed mates: none in an empty place, and none to a target."""
-    size, i = nonnegative(made.mate_width + c.message_size), nonnegative(observers.i)
+def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int, s: Record, rows: FloatArray) -> None:
+    """Write the messages of the mates in a place: none in an empty one, and none to a target."""
+    i = nonnegative(observers.i)
     for lane in range(observers.number):
-        e = nonnegative(observers.e + lane)
-        for p in range(nonnegative(c.neighbours)):
-            number = int(s.placed[WIDTH * p + lane])
-            start = nonnegative(made.width + c.sonar_beams + p * size + made.mate_width)
-            for q in range(nonnegative(c.message_size)):
-                said = ZERO
-                if number >= 0 and i < c.num_trackers:
-                    j = nonnegative(number)
-                    said = worlds.message[e, 0, j, q] if c.perfect_radio != 0 else worlds.heard_message[e, i, j, q]
-                rows[lane, start + q] = said
-
-
-@compiled
-def write_block(columns: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
-    """Write eight columns, the first of them column ``first``, to rows (number of worlds, ...)."""
-    a, b, c, d, f, g, h, j = transpose(columns)
-    # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, first, rows)
-    _write_row(b, 1, first, rows)
-    _write_row(c, 2, first, rows)
-    _write_row(d, 3, first, rows)
-    _write_row(f, 4, first, rows)
-    _write_row(g, 5, first, rows)
-    _write_row(h, 6, first, rows)
-    _write_row(j, 7, first, rows)
-
-
-@compiled
-def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
-    if lane < len(rows):
-        store(rows[lane], first, row)
+        e, number = nonnegative(observers.e + lane), int(s.placed[p, lane])
+        for q in range(nonnegative(c.message_size)):
+            said = ZERO
+            if number >= 0 and i < c.num_trackers:
+                j = nonnegative(number)
+                said = worlds.message[e, 0, j, q] if observers.now else worlds.heard_message[e, i, j, q]
+            rows[lane, q] = said
 
 
 @compiled

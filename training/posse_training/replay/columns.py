@@ -97,11 +97,10 @@ def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
 def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
     """Return the columns of the robots, the target and the radio."""
     step = states["world_step"][:, None]
-    outage = max(1, round(scenario.outage_time / scenario.control_step))
 
     def in_outage(name: str) -> Column:
         since = step.astype(np.int64) - states[name]
-        return Column((since >= 0) & (since < outage))
+        return Column((since >= 0) & (since < scenario.outage_steps))
 
     columns = {
         "tracker_x": Column(states["tracker_x"], _FINE),

@@ -13,6 +13,7 @@ from posse.numeric import (
     ZERO,
     FloatArray,
     Record,
+    Records,
     bits,
     choose,
     compiled,
@@ -26,23 +27,18 @@ from posse.numeric import (
     store,
 )
 from posse.rules.discs import FAR, blocks, nonnegative, num_discs, to_wall
+from posse.rules.kinematics import in_frame
 
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
-Place = tuple[np.float32, np.float32, np.float32, np.float32]
-"""x, y, cosine and sine of the heading, of a tracker or the target."""
-
 
 @compiled
-def echo_of_disc(c: Record, robot: Place, j: int, s: Record) -> None:
-    """Update the sonar readings with disc j.
+def echo_of_disc(c: Record, ahead: np.float32, left: np.float32, radius: np.float32, s: Record) -> None:
+    """Update the sonar readings with a disc, whose place is given in the robot's frame.
 
     A beam that contains the nearest point of the disc reads the distance of that point; another one, the distance at
     which its axis meets the disc. Usually the disc appears narrower than a beam, and no other axis can meet it.
     """
-    x, y, hc, hs = robot
-    dx, dy, radius = s.x[j] - x, s.y[j] - y, s.radius[j]
-    ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
     distance = root(ahead * ahead + left * left)
     if distance - radius >= c.sonar_range + c.robot_radius:
         return
@@ -64,16 +60,15 @@ def echo_of_disc(c: Record, robot: Place, j: int, s: Record) -> None:
 
 
 @out_of_line
-def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
+def echo_of_walls(c: Record, robot: Record, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
-    x, y, hc, hs = robot
     for normal_x, normal_y in ((ONE, ZERO), (-ONE, ZERO), (ZERO, ONE), (ZERO, -ONE)):  # outward
         half = c.half_width if normal_y == ZERO else c.half_height
-        distance = half - (normal_x * x + normal_y * y)
+        distance = half - (normal_x * robot.x + normal_y * robot.y)
         if distance >= c.sonar_range + c.robot_radius:
             continue
         nearest = max(distance - c.robot_radius, ZERO)
-        ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
+        ahead, left = in_frame(normal_x, normal_y, robot.heading_cos, robot.heading_sin)
         for block in range(blocks(c.sonar_beams)):
             k = WIDTH * block
             towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
@@ -83,12 +78,12 @@ def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
 
 
 @compiled
-def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: int) -> None:
-    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
+def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first: int) -> None:
+    """Write the sonar ring of a tracker or the target, metres from its rim, (S,) from ``first`` on in ``o``.
 
     The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    x, y, _, _ = robot
+    x, y, cosine, sine = robot.x, robot.y, robot.heading_cos, robot.heading_sin
     for block in range(blocks(c.sonar_beams)):
         store(s.reading, WIDTH * block, eight(c.sonar_range))
     for block in range(blocks(num_discs(c))):
@@ -99,9 +94,20 @@ def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: 
         while near != 0:
             disc = nonnegative(j + lowest_bit(near))
             if disc != number:
-                echo_of_disc(c, robot, disc, s)
+                ahead, left = in_frame(s.x[disc] - x, s.y[disc] - y, cosine, sine)
+                echo_of_disc(c, ahead, left, s.radius[disc], s)
             near &= near - 1
     if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
     for k in range(nonnegative(c.sonar_beams)):
         o[nonnegative(first + k)] = s.reading[k]
+
+
+@compiled
+def listen(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
+    """Write the sonar rings of all agents of a world to (rows, F), from ``first`` on."""
+    n = nonnegative(c.num_trackers)
+    for i in range(n):
+        ping(c, trackers[i], i, s, observations[i], first)
+    if c.target_agent != 0:
+        ping(c, w, n, s, observations[n], first)
