@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.support.adapters import out_of_band
+from tests.support.learned import policy_for
 
 import posse
 from posse_baselines import (
@@ -171,9 +172,11 @@ def test_what_cannot_be_recorded_is_named() -> None:
 # --- refusals ------------------------------------------------------------------------------------
 
 
-def test_a_policy_with_more_to_say_than_messages_hold_is_refused() -> None:
-    with pytest.raises(PolicyError, match=r"adds 5 numbers.*message_size=2.*message_size=5"):
-        load("ddcs-distributed").begin(posse.batch("constant", message_size=2).layout, 1)
+@pytest.mark.parametrize("policy", [load("ddcs-distributed"), policy_for(posse.batch().layout, outputs=5)])
+def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy) -> None:
+    size = policy.message_size
+    with pytest.raises(PolicyError, match=rf"adds {size} numbers.*message_size=2.*message_size={size}"):
+        policy.begin(posse.batch("constant", message_size=2).layout, 1)
 
 
 @pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])
