@@ -168,16 +168,3 @@ print("done")
 def test_a_motion_a_sensor_and_a_metric_are_part_of_the_kernel(tmp_path: Path) -> None:
     done = run(tmp_path, MOTION_SENSOR_AND_METRIC, **EXAMPLES)
     assert done.stdout.endswith("done\n"), done.stderr
-
-
-UNKNOWN = {
-    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'",
-    "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
-    "target_motion='spirall'": "unknown target_motion 'spirall' (did you mean 'spiral'?)",
-}
-
-
-@pytest.mark.parametrize("settings", UNKNOWN)
-def test_a_setting_that_names_nothing_is_refused(settings: str, tmp_path: Path) -> None:
-    code = f"import posse, spiral, steady, walls\nposse.batch('obstacles', {settings})"
-    assert UNKNOWN[settings] in run(tmp_path, code, **EXAMPLES).stderr

@@ -102,9 +102,7 @@ def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     at, own, target = points(batch, "tracker"), directions(batch, "tracker"), points(batch, "world")[:, None]
     assert belief.shape == (8, 5)
     assert (belief["known"] == 1.0).all()
-    np.testing.assert_allclose(
-        way(belief["target"], 3.0), (target - at) / own, rtol=0, atol=0.02
-    )
+    np.testing.assert_allclose(way(belief["target"], 3.0), (target - at) / own, rtol=0, atol=0.02)
     moving = batch.scenario.target_speed * directions(batch, "world")[:, None] / own
     np.testing.assert_allclose(belief["target_velocity"], moving, rtol=0, atol=0.05)
     np.testing.assert_array_equal(belief["task"].sum(-1), 1.0)
