@@ -36,7 +36,7 @@ MISTAKES: Final = {
     # Names of what is declared.
     FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
     TERM.format("c, w, t", "return 1").replace('{"own"', '{"wn"'): r"unknown reward term 'wn' \(did you mean 'own'",
-    MOTION.format("", "", "pass").replace('target_motion="own"', 'target_motion="wn"'): r"unknown target_motion 'wn' .did",
+    MOTION.format("", "", "pass").replace('motion="own"', 'motion="wn"'): r"unknown target_motion 'wn' .did",
     # Options.
     **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
        for size in ("0", "2.0", "1000000000", "True")},
