@@ -113,8 +113,7 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
 
 
 def test_wrong_actions_of_a_target_are_named() -> None:
-    target = load_target(f"{__name__}:Broken")
-    team = load("idle")
+    target, team = load_target(f"{__name__}:Broken"), load("idle")
     with pytest.raises(ValueError, match=r"target's policy returned actions of shape \(1, 1\)"):
         play(batch_for(team, SHORT, 2, target), team)
 
@@ -153,13 +152,10 @@ def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
 def test_a_circling_target_drives_a_circle(name: str, turns: float) -> None:
     batch = posse.batch("duel", 3, target_policy=load_target(name).policy)
     poses = rollout(batch, load("idle"), ["target_pose"], steps=40)["target_pose"]
-    scenario = batch.scenario
-    turned = np.unwrap(poses[..., 2], axis=0)
-    rate = turns * scenario.target_turn_rate
-    np.testing.assert_allclose(np.diff(turned, axis=0), rate * scenario.control_step, rtol=1e-3, atol=1e-3)
-    speed = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1) / scenario.control_step
-    assert (speed <= scenario.target_speed * 1.001).all()
-    assert (speed >= scenario.target_speed * 0.98).all()
+    s, turned = batch.scenario, np.diff(np.unwrap(poses[..., 2], axis=0), axis=0)
+    np.testing.assert_allclose(turned, turns * s.target_turn_rate * s.control_step, rtol=1e-3, atol=1e-3)
+    moved = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1)
+    np.testing.assert_allclose(moved, s.target_speed * s.control_step, rtol=0.02)
 
 
 def test_an_open_loop_target_restarts_with_its_world() -> None:

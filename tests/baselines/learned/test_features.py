@@ -37,8 +37,7 @@ def test_longer_messages_than_it_uses_change_nothing() -> None:
 
 
 def test_places_that_a_small_team_lacks_are_unknown() -> None:
-    full = posse.ObservationLayout(posse.get_scenario("smart"))
-    batch = posse.batch("smart", 1, num_trackers=2)
+    full, batch = posse.batch("smart").layout, posse.batch("smart", num_trackers=2)
     rows = Encoder(Encoding.of(full), batch.layout).encode(batch.reset())
     named = full.views(rows)
     np.testing.assert_array_equal(named["neighbour_range"][:, 1:], -1)
