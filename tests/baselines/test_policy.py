@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.support.adapters import out_of_band
+from tests.support.learned import policy_for
 
 import posse
 from posse_baselines import (
@@ -33,16 +34,10 @@ def batch_for(policy: Policy, scenario: str, worlds: int, **settings: Any) -> po
     return posse.batch(scenario, worlds, **settings)
 
 
-def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[list[Any], list[Any]]:
-    """Observations and actions of a policy."""
-    observations, memory = batch.reset(), begin(policy, batch)
-    seen, done = [], []
-    for _ in range(steps):
-        actions, memory = policy.act(observations, memory)
-        seen.append(observations)
-        done.append(actions)
-        observations, *_ = batch.step(actions)
-    return seen, done
+def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[Any, Any]:
+    """Observations and actions of a policy, (steps, E, N, ...)."""
+    played = rollout(batch, policy, ["observations", "actions"], steps=steps)
+    return played["observations"][:-1], played["actions"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -52,6 +47,7 @@ def test_an_episode_unpickled_from_buffers_goes_on_as_before(name: str) -> None:
     observations, memory = batch.reset(seed=1), begin(policy, batch)
     for _ in range(5):
         actions, memory = policy.act(observations, memory)
+        assert actions.dtype == np.float32
         observations, *_ = batch.step(actions)
     game, seen = (policy, batch, memory), observations
     ends = []
@@ -83,9 +79,7 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
         with pytest.raises(PolicyError, match="sonar"):  # its network reads it
             begin(policy, batch)
         return
-    _, done = trace(policy, batch, 2 if slow else 5)  # the batch refuses numbers outside [-1, 1]
-    assert done[0].shape == batch.action_shape
-    assert done[0].dtype == np.float32
+    trace(policy, batch, 2 if slow else 5)  # the batch refuses other shapes, and numbers outside [-1, 1]
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long if "planner" in n else ()) for n in NAMES])
@@ -95,10 +89,7 @@ def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
     many = batch_for(policy, "field", worlds, seed=4)
     alone = batch_for(policy, "field", 1, seed=4, first_world=worlds - 1)
     steps = 12 if policy.reads_state else 8  # the planner's: it plans three times
-    many_actions = trace(policy, many, steps)[1]
-    alone_actions = trace(policy, alone, steps)[1]
-    for a, b in zip(many_actions, alone_actions, strict=True):
-        np.testing.assert_array_equal(a[-1], b[0])
+    np.testing.assert_array_equal(trace(policy, many, steps)[1][:, -1], trace(policy, alone, steps)[1][:, 0])
 
 
 @pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
@@ -134,31 +125,25 @@ def test_a_restarted_world_plays_as_a_new_one(name: str) -> None:
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
 def test_rollout_restarts_memories_when_episodes_begin(autoreset: str) -> None:
-    class Recorder(BasePolicy):
-        name = "recorder"
+    class Counting(BasePolicy):
+        """Remembers how many steps of its episode each world has played, and how many episodes began."""
+
+        def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
+            return np.zeros(num_worlds), 1
 
         def act(self, observations: Any, memory: Any) -> Any:
-            return np.zeros((*observations.shape[:2], 2), np.float32), memory
+            played, episodes = memory
+            left = batch.layout.views(observations)["time_left"][:, 0]
+            np.testing.assert_allclose(left, 3.0 - 0.1 * played, atol=1e-5)
+            return np.zeros((*observations.shape[:2], 2), np.float32), (played + 1, episodes)
 
         def restart(self, memory: Any, mask: Any) -> Any:
-            restarted.append((count + 1, mask.copy()))  # the step under way
-            return memory
+            return np.where(mask, 0, memory[0]), memory[1] + 1
 
     batch = posse.batch("constant", 3, horizon=30, autoreset=autoreset)
-    restarted: list[Any] = []
-    begins: list[int] = []
-    count = -1
-
-    def note(step: Played) -> None:
-        nonlocal count
-        count += 1
-        if np.allclose(batch.layout.views(batch.observe())["time_left"][:, 0], 3.0):
-            begins.append(count)
-
-    rollout(batch, Recorder(), steps=66, after_step=note)
-    assert len(begins) == 2
-    assert [at for at, _ in restarted] == begins
-    assert all(mask.all() for _, mask in restarted)
+    steps: list[Played] = []
+    rollout(batch, Counting(), steps=66, after_step=steps.append)
+    assert steps[-1].memory[1] == 3
 
 
 def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
@@ -187,9 +172,11 @@ def test_what_cannot_be_recorded_is_named() -> None:
 # --- refusals ------------------------------------------------------------------------------------
 
 
-def test_a_policy_with_more_to_say_than_messages_hold_is_refused() -> None:
-    with pytest.raises(PolicyError, match=r"adds 5 numbers.*message_size=2.*message_size=5"):
-        load("ddcs-distributed").begin(posse.batch("constant", message_size=2).layout, 1)
+@pytest.mark.parametrize("policy", [load("ddcs-distributed"), policy_for(posse.batch().layout, outputs=5)])
+def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy) -> None:
+    size = policy.message_size
+    with pytest.raises(PolicyError, match=rf"adds {size} numbers.*message_size=2.*message_size={size}"):
+        policy.begin(posse.batch("constant", message_size=2).layout, 1)
 
 
 @pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])

@@ -10,7 +10,7 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import Policy, PolicyError, batch_for, begin, load, load_target, play, policy_names, target_names
+from posse_baselines import Policy, PolicyError, batch_for, load, load_target, play, policy_names, target_names
 from posse_baselines.playing import rollout
 from posse_baselines.policies.open_loop import OPEN_LOOP
 
@@ -76,25 +76,17 @@ def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 # --- targets -------------------------------------------------------------------------------------
 
 
-class Straight:
-    """A target of one's own, which drives straight on."""
+class Broken:
+    """A target of one's own, whose actions have another shape."""
 
     def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
         return None
 
     def act(self, observations: Any, memory: Any) -> Any:
-        return np.tile(np.array([1, 0], np.float32), (*observations.shape[:2], 1)), memory
+        return np.zeros((1, 1)), memory
 
     def restart(self, memory: Any, mask: Any) -> Any:
         return memory
-
-
-class Broken(Straight):
-    def act(self, observations: Any, memory: Any) -> Any:
-        return np.zeros((1, 1)), memory
-
-
-CODE = f"{__name__}:Straight"
 
 
 def test_a_scripted_target_is_the_scenarios_motion() -> None:
@@ -105,35 +97,11 @@ def test_a_scripted_target_is_the_scenarios_motion() -> None:
     assert load_target(target) is target
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    path = tmp_path / "evader.safetensors"
-    target_for(SHORT).save(path)
-    return path
-
-
-def test_a_target_plays_inside_the_worlds_as_beside_them(file: Path) -> None:
-    for text in (str(file), CODE):
-        target = load_target(text)
-        assert target.policy is not None
-        team = load("pursuit")
-        inside = play(batch_for(team, SHORT, 4, target, seed=2), team)
-        batch = posse.Batch(target.fit(SHORT), 4, seed=2, autoreset="disabled")
-        observations = batch.reset()
-        memories = begin(team, batch), target.policy.begin(batch.layout, 4)
-        while not batch.truncated.all():
-            mine, first = team.act(np.ascontiguousarray(observations[:, :-1]), memories[0])
-            theirs, second = target.policy.act(np.ascontiguousarray(observations[:, -1:]), memories[1])
-            memories = first, second
-            observations, *_ = batch.step(np.concatenate([mine, theirs[..., :2]], axis=1))
-        for name, column in batch.metrics().items():
-            np.testing.assert_array_equal(column, inside[name], name)
-
-
-def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
+def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
+    file, team = tmp_path / "evader.safetensors", tmp_path / "team.safetensors"
+    target_for(SHORT).save(file)
     with pytest.raises(PolicyError, match=r"policy of a target: give it as target="):
         load(file)
-    team = tmp_path / "team.safetensors"
     any_policy().save(team)
     with pytest.raises(PolicyError, match="policy of a team, 'mine'"):
         load_target(team)
@@ -145,8 +113,7 @@ def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
 
 
 def test_wrong_actions_of_a_target_are_named() -> None:
-    target = load_target(f"{__name__}:Broken")
-    team = load("idle")
+    target, team = load_target(f"{__name__}:Broken"), load("idle")
     with pytest.raises(ValueError, match=r"target's policy returned actions of shape \(1, 1\)"):
         play(batch_for(team, SHORT, 2, target), team)
 
@@ -185,13 +152,10 @@ def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
 def test_a_circling_target_drives_a_circle(name: str, turns: float) -> None:
     batch = posse.batch("duel", 3, target_policy=load_target(name).policy)
     poses = rollout(batch, load("idle"), ["target_pose"], steps=40)["target_pose"]
-    scenario = batch.scenario
-    turned = np.unwrap(poses[..., 2], axis=0)
-    rate = turns * scenario.target_turn_rate
-    np.testing.assert_allclose(np.diff(turned, axis=0), rate * scenario.control_step, rtol=1e-3, atol=1e-3)
-    speed = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1) / scenario.control_step
-    assert (speed <= scenario.target_speed * 1.001).all()
-    assert (speed >= scenario.target_speed * 0.98).all()
+    s, turned = batch.scenario, np.diff(np.unwrap(poses[..., 2], axis=0), axis=0)
+    np.testing.assert_allclose(turned, turns * s.target_turn_rate * s.control_step, rtol=1e-3, atol=1e-3)
+    moved = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1)
+    np.testing.assert_allclose(moved, s.target_speed * s.control_step, rtol=0.02)
 
 
 def test_an_open_loop_target_restarts_with_its_world() -> None:

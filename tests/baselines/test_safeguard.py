@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from tests.support.learned import network_for
+from tests.support.reference.state import directions, points
 
 import posse
 from posse_baselines import PolicyError, Safeguard, rollout
@@ -35,26 +36,20 @@ def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
 
 def full_speed(safe: bool) -> tuple[float, float]:
     """Drive at full speed towards the common middle; return the share of worlds with contact, and the way, m."""
-    settings: dict[str, Any] = {"seed": 1, "num_trackers": 4, "horizon": 100, "settle_time": 1.0}
-    batch = posse.batch("constant", 20, start_distance=(2.0, 3.0), autoreset="disabled", **settings)
-    observations = batch.reset()
-    guard = Guard(batch.layout, 20)
-    middle = np.stack([batch.arrays.tracker["x"], batch.arrays.tracker["y"]], axis=-1).mean(axis=1, keepdims=True)
-    way = 0.0
+    near: dict[str, Any] = {"num_trackers": 4, "start_distance": (2.0, 3.0), "horizon": 100, "settle_time": 1.0}
+    batch = posse.batch("constant", 20, seed=1, autoreset="disabled", **near)
+    observations, guard, s, way = batch.reset(), Guard(batch.layout, 20), batch.scenario, 0.0
+    middle = points(batch, "tracker").mean(axis=1, keepdims=True)
     for _ in range(100):
-        views = batch.layout.views(observations)
-        at = np.stack([batch.arrays.tracker["x"], batch.arrays.tracker["y"]], axis=-1)
-        c, s = views["heading"][..., 0], views["heading"][..., 1]
-        d = (middle - at) / np.maximum(np.linalg.norm(middle - at, axis=-1, keepdims=True), 1e-6)
-        wanted = np.stack([d[..., 0] * c + d[..., 1] * s, d[..., 1] * c - d[..., 0] * s], axis=-1)
+        wanted = (middle - points(batch, "tracker")) / directions(batch, "tracker")
+        wanted /= np.maximum(np.abs(wanted), 1e-6)
         guard.follow(observations)
-        actions = guard.actions(wanted)
+        actions = guard.actions(np.stack([wanted.real, wanted.imag], axis=-1).astype(np.float32))
         if not safe:
-            turn = np.arctan2(wanted[..., 1], wanted[..., 0]) / batch.scenario.control_step
-            ahead = 2 * np.clip(wanted[..., 0], 0, 1) - 1
-            actions = np.stack([ahead, np.clip(turn / batch.scenario.tracker_turn_rate, -1, 1)], -1).astype(np.float32)
+            turn = np.angle(wanted) / (s.control_step * s.tracker_turn_rates[0])
+            actions = np.stack([2 * np.maximum(wanted.real, 0) - 1, turn], axis=-1).clip(-1, 1)
         observations, *_ = batch.step(actions)
-        way += float(views["speed"].mean()) * batch.scenario.control_step
+        way += float(batch.state["tracker_speed"].mean()) * s.control_step
     return float((batch.metrics()["contact_free"] == 0).mean()), way
 
 
@@ -67,17 +62,16 @@ def test_it_keeps_robots_apart_that_want_the_same_place() -> None:
 
 def test_it_foresees_commands_that_act_late() -> None:
     """Robots that want to go one way settle on it without swinging about it, though commands lag and wait."""
-    batch = posse.batch(
-        "constant", 8, actuator_lag=0.3, command_delay=3, start_distance=(3.0, 5.0), autoreset="disabled"
-    )
+    late: dict[str, Any] = {"actuator_lag": 0.3, "command_delay": 3, "start_distance": (3.0, 5.0)}
+    batch = posse.batch("constant", 8, autoreset="disabled", **late)
     observations, guard = batch.reset(seed=2), Guard(batch.layout, 8)
     errors = []
     for _ in range(60):
-        views = batch.layout.views(observations)
-        c, s = views["heading"][..., 0], views["heading"][..., 1]
+        heading = directions(batch, "tracker")
         guard.follow(observations)
-        observations, *_ = batch.step(guard.actions(0.5 * np.stack([c, -s], axis=-1)))  # along the common x axis
-        errors.append(np.abs(np.arctan2(s, c)))
+        along = 0.5 * np.stack([heading.real, -heading.imag], axis=-1)  # the common x axis
+        observations, *_ = batch.step(guard.actions(along.astype(np.float32)))
+        errors.append(np.abs(np.angle(heading)))
     assert np.median(errors[0]) > 0.5
     assert np.quantile(errors[40:], 0.9) < 0.05
 

@@ -1,4 +1,4 @@
-"""``posse/Tracker-v0``: one tracker is a Gymnasium agent, its team-mates are scripted; alone and in many worlds."""
+"""``posse/Tracker-v0``: one tracker is a Gymnasium agent, its team-mates are scripted."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from tests.support.adapters import play_both
 
 import posse
 from posse_baselines import PolicyError, begin, load
 from posse_baselines.tracker_env import TrackerEnv
 
-NAME, E = "posse/Tracker-v0", 3
 SHORT: dict[str, Any] = {"horizon": 40}
 
 
@@ -36,7 +33,7 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
 
 
 def vector(**settings: Any) -> Any:
-    return gymnasium.make_vec(NAME, E, vectorization_mode="vector_entry_point", **settings)
+    return gymnasium.make_vec("posse/Tracker-v0", 3, vectorization_mode="vector_entry_point", **settings)
 
 
 @pytest.mark.parametrize("make", [TrackerEnv, vector])
@@ -49,31 +46,3 @@ def test_what_cannot_be_played_is_refused(make: Any) -> None:
         make(scenario="constant", target_motion="agent")
     with pytest.raises(PolicyError, match="unknown policy 'pursiut'"):
         make(scenario="constant", teammates="pursiut")
-
-
-# --- many worlds -----------------------------------------------------------------------------------
-
-SETTINGS: dict[str, Any] = {
-    "scenario": "radio",
-    "num_trackers": 3,
-    "number": 1,
-    "horizon": 14,
-    "settle_time": 0.5,
-    "terminate_on_contact": True,
-    "start_distance": (1.0, 4.0),
-    "breaks": 1,
-    "break_window": (0.2, 0.4),
-}
-
-
-@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
-@pytest.mark.parametrize("kind", [{}, {"silent": False}, {"discrete_actions": True}])
-def test_many_worlds_agree_with_gymnasiums_own_vector_of_single_ones(
-    mode: AutoresetMode, kind: dict[str, bool]
-) -> None:
-    settings = {**SETTINGS, **kind}
-    ours = vector(autoreset=mode.name.lower(), **settings)
-    makes = [lambda i=i: gymnasium.make(NAME, first_world=i, **settings) for i in range(E)]
-    theirs: Any = SyncVectorEnv(makes, autoreset_mode=mode)
-    ends = sum(play_both(ours, theirs, mode, 40))
-    assert ends >= 2 * E

@@ -33,6 +33,10 @@ MISTAKES: Final = {
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
     TERM.format("c, *w", "return 1"): r"its parameters are \(c, \*w\), not",
     MOTION.format("", ", team", "pass"): r"its parameters are \(c, w, team\), not \(c, w\) or \(c, w, trackers\) or",
+    # Names of what is declared.
+    FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
+    TERM.format("c, w, t", "return 1").replace('{"own"', '{"wn"'): r"unknown reward term 'wn' \(did you mean 'own'",
+    MOTION.format("", "", "pass").replace('motion="own"', 'motion="wn"'): r"unknown target_motion 'wn' .did",
     # Options.
     **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
        for size in ("0", "2.0", "1000000000", "True")},
@@ -96,7 +100,7 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.mark.parametrize("code", MISTAKES)
 def test_a_mistake_names_the_function_the_line_and_the_reason(code: str, messages: dict[str, str]) -> None:
-    assert messages[code].startswith("DeclarationError: ")
+    assert messages[code].startswith(("DeclarationError: ", "ScenarioError: "))
     assert re.search(MISTAKES[code], messages[code]), messages[code]
 
 

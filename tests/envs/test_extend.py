@@ -28,6 +28,7 @@ import closing
 import steady
 import twice
 import walls
+from tests.support.reference.state import directions, points
 
 settings = dict(
     extra_fields=("closing_speed", "wall_distance", "twice"),
@@ -47,19 +48,16 @@ for step in range(60):
     for name, view in other.items():
         np.testing.assert_array_equal(o[name], view, err_msg=name)
     assert ((observed >= low) & (observed <= high)).all()
-    state = batch.state
-    x, y, heading, side, speed = (
-        np.concatenate([state[f"tracker_{k}"], state[f"world_{k}"][:, None]], axis=1)
-        for k in ("x", "y", "heading_cos", "heading_sin", "speed")
-    )
-    rim = s.arena / 2 - s.robot_radius
-    np.testing.assert_allclose(o["wall_distance"], rim - np.maximum(abs(x), abs(y)), rtol=1e-5, atol=1e-5)
+    place, heading = (np.column_stack([each(batch, "tracker"), each(batch, "world")]) for each in (points, directions))
+    speed = np.column_stack([batch.state["tracker_speed"], batch.state["world_speed"]])
+    wall = s.arena / 2 - s.robot_radius - np.maximum(abs(place.real), abs(place.imag))
+    np.testing.assert_allclose(o["wall_distance"], wall, rtol=1e-5, atol=1e-5)
     np.testing.assert_array_equal(o["twice"][..., 0], np.where(speed > 0, 1, -1))
     np.testing.assert_array_equal(o["twice"][..., 1], 4)
-    velocity = speed * (heading + 1j * side)
+    velocity = speed * heading
     for i in range(5):
         number = o["neighbour_number"][:, i].astype(int)
-        apart = np.take_along_axis(x + 1j * y, number, 1) - (x + 1j * y)[:, i : i + 1]
+        apart = np.take_along_axis(place, number, 1) - place[:, i : i + 1]
         moving = np.take_along_axis(velocity, number, 1) - velocity[:, i : i + 1]
         closing_speed = -(apart.conj() * moving).real / abs(apart)
         there = number >= 0
@@ -98,6 +96,7 @@ import bearing
 import distance
 import spiral
 from posse.signals.layout import StateLayout
+from tests.support.reference.state import directions, points
 
 @posse.metric("1")
 def last_heading(s, w):
@@ -113,12 +112,10 @@ low, high = batch.layout.bounds()
 observations = batch.reset(seed=0)
 heading, ever, bearings, losses, distances = [], 0, np.nan, 0, []
 for step in range(100):
-    state, o = batch.state, batch.layout.views(observations)
-    heading.append(np.arctan2(state["world_heading_sin"], state["world_heading_cos"]))
-    offset = state["world_x"][:, None] - state["tracker_x"]
-    offset = offset + 1j * (state["world_y"][:, None] - state["tracker_y"])
-    own = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
-    told = (o["target_bearing"][..., 0] + 1j * o["target_bearing"][..., 1]) * own
+    o = batch.layout.views(observations)
+    heading.append(np.angle(directions(batch, "world")))
+    offset = points(batch, "world")[:, None] - points(batch, "tracker")
+    told = o["target_bearing"] @ [1, 1j] * directions(batch, "tracker")
     seen, known = o["target_seen"] > 0, o["target_known"] > 0
     np.testing.assert_array_equal(seen, abs(offset) <= s.sensing_range)
     ever = ever | seen
@@ -137,7 +134,6 @@ for step in range(100):
     distances += [abs(offset)] * (step > 0)
     observations, *_, infos = batch.step(np.ones(batch.action_shape))
 assert losses > 0
-state = batch.state
 turned = np.unwrap(heading, axis=0)
 turned -= turned[0]
 side = batch.state["world_spiral_side"]
@@ -151,9 +147,8 @@ assert "spiral_side" not in StateLayout(posse.get_scenario("smart")).offsets
 # The metric, at any time and at the end of the episode; beside the built-in ones, which it leaves.
 metrics = batch.metrics()
 assert list(metrics) == [metric.name for metric in posse.METRICS] + ["target_distance", "last_heading"]
-np.testing.assert_array_equal(metrics["last_heading"], state["world_heading_cos"])
-x, y = state["world_x"][:, None], state["world_y"][:, None]
-distances.append(np.hypot(x - state["tracker_x"], y - state["tracker_y"]))
+np.testing.assert_array_equal(metrics["last_heading"], batch.state["world_heading_cos"])
+distances.append(abs(points(batch, "world")[:, None] - points(batch, "tracker")))
 np.testing.assert_allclose(metrics["target_distance"], np.mean(distances, (0, 2)), rtol=1e-5)
 assert (infos["metrics/target_distance"] == 0).all()
 infos = batch.step(np.ones(batch.action_shape))[-1]
@@ -168,16 +163,3 @@ print("done")
 def test_a_motion_a_sensor_and_a_metric_are_part_of_the_kernel(tmp_path: Path) -> None:
     done = run(tmp_path, MOTION_SENSOR_AND_METRIC, **EXAMPLES)
     assert done.stdout.endswith("done\n"), done.stderr
-
-
-UNKNOWN = {
-    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'",
-    "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
-    "target_motion='spirall'": "unknown target_motion 'spirall' (did you mean 'spiral'?)",
-}
-
-
-@pytest.mark.parametrize("settings", UNKNOWN)
-def test_a_setting_that_names_nothing_is_refused(settings: str, tmp_path: Path) -> None:
-    code = f"import posse, spiral, steady, walls\nposse.batch('obstacles', {settings})"
-    assert UNKNOWN[settings] in run(tmp_path, code, **EXAMPLES).stderr

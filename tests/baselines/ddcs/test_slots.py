@@ -14,28 +14,22 @@ from posse_baselines.ddcs.baseline import FAMILY
 
 
 @pytest.mark.parametrize(
-    "settings",
+    ("worlds", "settings"),
     [
-        {},
-        {"formation": "ring", "num_trackers": 6},
-        {"formation": "rows", "num_trackers": 9},
-        {"radio_loss": 0.3, "radio_delay": 2},
-        {"num_trackers": 8, "formation": "ring", "num_neighbours": 3},
+        (40, {}),
+        (40, {"formation": "ring", "num_trackers": 6}),
+        (40, {"formation": "rows", "num_trackers": 9}),
+        (40, {"radio_loss": 0.3, "radio_delay": 2}),
+        (40, {"num_trackers": 8, "formation": "ring", "num_neighbours": 3}),
+        # Team-mates that are no longer in the observation must not stay as obstacles where they were.
+        (10, {"num_trackers": 40, "num_neighbours": 8, "formation": "rows"}),
     ],
 )
-def test_trackers_end_in_slots_of_their_own(settings: dict[str, Any]) -> None:
-    batch = posse.batch("constant", 40, split="train", message_size=5, **settings)
+def test_trackers_end_in_slots_of_their_own(worlds: int, settings: dict[str, Any]) -> None:
+    batch = posse.batch("constant", worlds, split="train", message_size=5, **settings)
     metrics = play(batch, load("ddcs-distributed"))
     assert np.isfinite(metrics["settling_time"]).mean() >= 0.95
     assert metrics["score"].mean() >= 0.85 * metrics["bound"].mean()
-
-
-def test_a_large_team_of_which_each_knows_eight_settles() -> None:
-    # Team-mates that are no longer in the observation must not stay as obstacles where they were.
-    team: dict[str, Any] = {"num_trackers": 40, "num_neighbours": 8, "formation": "rows", "message_size": 5}
-    batch = posse.batch("constant", 10, split="validation", autoreset="disabled", **team)
-    metrics = play(batch, load("ddcs-distributed"))
-    assert np.isfinite(metrics["settling_time"]).mean() >= 0.9
 
 
 @pytest.mark.parametrize("name", sorted({*FAMILY} - {"velocity-pursuit", "ddcs-no-radio"}))
@@ -65,19 +59,14 @@ def test_a_rectangle_is_searched_as_fast_as_a_square_of_its_area() -> None:
     assert rectangle.mean() < square.mean() + 1.0
 
 
-@pytest.mark.parametrize("name", ["pngl-l-phi", "ddcs-distributed"])
-def test_late_commands_cost_the_team_little(name: str) -> None:
+LATE, DRIFTING = {"actuator_lag": 0.5, "command_delay": 3}, {"odometry_drift": 0.05, "heading_drift": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"), [("pngl-l-phi", LATE), ("ddcs-distributed", LATE), ("pngl-l-phi", DRIFTING)]
+)
+def test_late_commands_and_drifting_poses_cost_the_team_little(name: str, fault: dict[str, Any]) -> None:
     policy = load(name)
-    late = posse.get_scenario("constant", actuator_lag=0.5, command_delay=3)
-    metrics = play(posse.batch(late, 60, split="train", message_size=policy.message_size), policy)
-    assert metrics["safe_score"].mean() >= 0.75
-    assert (metrics["contact_free"] == 0).mean() <= 0.02
-
-
-def test_drifting_poses_cost_the_baseline_hardly_anything() -> None:
-    policy = load("pngl-l-phi")
-    drifting = posse.get_scenario("constant", odometry_drift=0.05, heading_drift=0.01)
-    batch = posse.batch(drifting, 60, split="train", message_size=policy.message_size)
-    metrics = play(batch, policy)
+    metrics = play(posse.batch("constant", 60, split="train", message_size=policy.message_size, **fault), policy)
     assert metrics["safe_score"].mean() >= 0.75
     assert (metrics["contact_free"] == 0).mean() <= 0.02

@@ -8,24 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.baselines.laws.test_guidance import body_of
 
 from posse import get_scenario
 from posse_baselines.ddcs.memory import constants_of
-from posse_baselines.laws.guidance import BODY, regulate
+from posse_baselines.laws.guidance import regulate
 from posse_baselines.laws.safeguard import DISC, put_disc, put_walls, safe_velocity
 
 DT = 0.1
 Disc = tuple[complex, complex, float, float]
 """Place, velocity, reach, margin."""
 LIMITS = pytest.mark.parametrize("limits", [(1e4, 1e4), (1.0, 4.0)])  # acceleration, turn acceleration
-
-
-def body_of(theta: float, speed: float, limits: tuple[float, float]) -> Any:
-    body = np.zeros(1, BODY)[0]
-    body.heading, body.speed = cmath.rect(1.0, theta), speed
-    body.max_speed, body.max_omega, body.dt = 1.0, 2.0, DT
-    body.acceleration, body.turn_acceleration = limits
-    return body
 
 
 def safe(body: Any, wanted: complex, *discs: Disc) -> tuple[complex, bool]:

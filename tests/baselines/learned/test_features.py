@@ -7,12 +7,12 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.learned import network_for, observations_of, policy_for
+from tests.support.learned import observations_of, policy_for
+from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
-from posse_baselines import PolicyError
-from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
+from posse_baselines.learned import Encoder, Encoding, Network
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
 
 
@@ -26,21 +26,6 @@ def test_names_are_those_of_views() -> None:
         np.testing.assert_array_equal(views[field][(..., *index)], observations[..., column])
 
 
-def test_another_sonar_is_refused_by_name() -> None:
-    policy = policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
-    other = posse.ObservationLayout(posse.get_scenario("smart", sonar_beams=16))
-    with pytest.raises(PolicyError, match="sonar"):
-        policy.begin(other, 1)
-
-
-def test_a_policy_that_speaks_needs_messages() -> None:
-    layout = posse.ObservationLayout(posse.get_scenario("smart", message_size=3))
-    policy = LearnedPolicy(network_for(Encoding.of(layout).size, 5), Encoding.of(layout), {"name": "talker"})
-    assert policy.message_size == 3
-    with pytest.raises(PolicyError, match="message_size"):
-        policy.begin(posse.ObservationLayout(posse.get_scenario("smart")), 1)
-
-
 def test_longer_messages_than_it_uses_change_nothing() -> None:
     small, observations = observations_of("smart", steps=0)
     policy = policy_for(small.layout)
@@ -52,8 +37,7 @@ def test_longer_messages_than_it_uses_change_nothing() -> None:
 
 
 def test_places_that_a_small_team_lacks_are_unknown() -> None:
-    full = posse.ObservationLayout(posse.get_scenario("smart"))
-    batch = posse.batch("smart", 1, num_trackers=2)
+    full, batch = posse.batch("smart").layout, posse.batch("smart", num_trackers=2)
     rows = Encoder(Encoding.of(full), batch.layout).encode(batch.reset())
     named = full.views(rows)
     np.testing.assert_array_equal(named["neighbour_range"][:, 1:], -1)
@@ -71,19 +55,12 @@ def test_fewer_places_keep_the_nearest() -> None:
 def test_own_slot_is_where_the_state_says() -> None:
     batch, observations = observations_of("constant", worlds=8, steps=30)
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
-    features = rows[:, :NUM_FEATURES].reshape(8, 5, NUM_FEATURES)
-    w, t = batch.worlds[:, None], batch.arrays.tracker
-    slots = np.array(batch.scenario.slot_offsets)
-    x = w["x"] + slots[:, 0] * w["frame_cos"] - slots[:, 1] * w["frame_sin"]
-    y = w["y"] + slots[:, 0] * w["frame_sin"] + slots[:, 1] * w["frame_cos"]
-    dx, dy = x[:, None] - t["x"][..., None], y[:, None] - t["y"][..., None]
-    hc, hs = t["heading_cos"][..., None], t["heading_sin"][..., None]
-    ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-    soft = features[:, :, 14 + 2 : 14 + 4]
-    length = np.hypot(soft[..., 0], soft[..., 1])
-    d = 3.0 * length / (1 - length)
-    mine = soft / length[..., None] * d[..., None]
-    away = np.hypot(ahead - mine[..., :1], left - mine[..., 1:])
+    soft = rows[:, 14 + 2 : 14 + 4].reshape(8, 5, 2) @ [1, 1j]  # its length is d / (d + 3)
+    found = 3.0 * soft / (1 - np.abs(soft))
+    frame = points(batch, "world", "frame_cos", "frame_sin")
+    places = points(batch, "world")[:, None] + np.array(batch.scenario.slot_offsets) @ [1, 1j] * frame[:, None]
+    slots = (places[:, None] - points(batch, "tracker")[..., None]) / directions(batch, "tracker")[..., None]
+    away = np.abs(slots - found[..., None])
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
     # With a perfect radio all compute the same assignment, so each slot is assigned once.

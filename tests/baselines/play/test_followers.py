@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from tests.support.drive import Instant, complex_of, drive
 
@@ -20,7 +21,6 @@ LIMITS: dict[str, Any] = {
     "tracker_speed": 2.0,
     "tracker_turn_rate": 10.0,
     "target_speed": 1.2,
-    "num_trackers": 2,
     "start_distance": (0.5, 6.0),
     "target_pose": (0.0, 0.0, 0.0),
 }
@@ -32,23 +32,23 @@ PLACE = complex(-WING, WING)
 
 def team(
     policy: str | Policy,
-    error: complex,
+    *errors: complex,
     dt: float = 0.1,
     seconds: float = 3.0,
     target: Callable[[float], tuple[float, float]] = lambda _: (1.2, 0.0),
-    theta: float = 0.0,
 ) -> list[Instant]:
-    """A leader in its slot, and a follower that is ``error`` (m) off its own."""
-    leader, follower = -1.2 + 0j, -1.2 + PLACE + error
-    start = [(z.real, z.imag, theta * i) for i, z in enumerate((leader, follower))]
-    settings = {**LIMITS, "control_step": dt, "physics_step": dt / 2, "tracker_pose": start}
+    """A leader in its slot of a wedge, and one or two followers that are ``errors`` (m) off theirs."""
+    slots = (-1.2 + 0j, -1.2 + PLACE, -1.2 + PLACE.conjugate())
+    places = [slot + error for slot, error in zip(slots, (0j, *errors), strict=False)]
+    settings = {**LIMITS, "control_step": dt, "physics_step": dt / 2, "num_trackers": len(places)}
+    settings["tracker_pose"] = [(z.real, z.imag, 0.0) for z in places]
     return list(drive(policy, "constant", 1, round(seconds / dt), target=target, **settings))
 
 
-def control_point(now: Instant) -> tuple[complex, float]:
-    """The follower's control point as seen from the leader (m), and the leader's heading."""
-    place, theta = complex_of(now.tracker)[0], now.tracker[0, :, 2]
-    return complex(place[1] + cmath.rect(OFFSET, theta[1]) - place[0]), float(theta[0])
+def arms(seen: list[Instant], robot: int, mate: int) -> npt.NDArray[np.complex128]:
+    """A robot's control point as seen from a mate, m."""
+    away = np.array([now.line_of_sight[0, mate] - now.line_of_sight[0, robot] for now in seen])
+    return away + OFFSET * np.exp(1j * np.array([now.tracker[0, robot, 2] for now in seen]))
 
 
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004)])
@@ -56,13 +56,13 @@ def control_point(now: Instant) -> tuple[complex, float]:
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
     wanted = PLACE + OFFSET
     for error in (0.3 + 0.2j, -0.3 + 0.2j, -0.3j, -0.4 + 0j, 0.2 + 0.3j):
-        seen = team(DDCS.of("pngl-l-phi").with_settings(follower_frame=frame), error, dt)
+        seen = team(DDCS.of("pngl-l-phi").with_settings(follower_frame=frame), error, dt=dt)
         assert all((now.notes["task"] == FLOCKING).all() for now in seen)
-        arms = [control_point(now)[0] for now in seen]
+        arm = arms(seen, 1, 0)
         decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
-        off = np.abs(arms) - abs(wanted)
+        off = np.abs(arm) - abs(wanted)
         np.testing.assert_allclose(off, off[0] * decay, atol=allowed)
-        turned = np.angle(np.array(arms) / wanted)
+        turned = np.angle(arm / wanted)
         np.testing.assert_allclose(turned, turned[0] * decay, atol=allowed)
 
 
@@ -79,28 +79,12 @@ def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(
 # --- l-l -----------------------------------------------------------------------------------------
 
 
-def three(policy: str | Policy, error: complex, dt: float) -> list[Instant]:
-    """Three trackers of a wedge in their slots, but the third is ``error`` (m) off its own."""
-    places = (-1.2 + 0j, -1.2 + PLACE, -1.2 + PLACE.conjugate() + error)
-    settings = {**LIMITS, "control_step": dt, "physics_step": dt / 2, "num_trackers": 3}
-    settings["tracker_pose"] = [(z.real, z.imag, 0.0) for z in places]
-    return list(drive(policy, "constant", 1, round(2.0 / dt), target=lambda _: (1.2, 0.0), **settings))
-
-
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.003), (0.02, 0.001)])
 def test_l_l_closes_the_distances_to_two_robots(dt: float, allowed: float) -> None:
     error = -0.35 + 0.2j  # under l-φ the second distance is up to 0.006 m and 0.008 m off
-    seen = three("ddcs-centralized-l-l", error, dt)
+    seen = team("ddcs-centralized-l-l", 0j, error, dt=dt, seconds=2.0)
     decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
     for mate, place in ((0, 0j), (1, PLACE)):
-        arms = np.array(
-            [
-                complex_of(now.tracker)[0, 2]
-                + cmath.rect(OFFSET, now.tracker[0, 2, 2])
-                - complex_of(now.tracker)[0, mate]
-                for now in seen
-            ]
-        )
-        off = np.abs(arms) - abs(PLACE.conjugate() + OFFSET - place)
+        off = np.abs(arms(seen, 2, mate)) - abs(PLACE.conjugate() + OFFSET - place)
         # In the first step it is not known which robots are in their places: l-φ is used.
         np.testing.assert_allclose(off[2:], off[2] * decay[2:] / decay[2], atol=allowed)

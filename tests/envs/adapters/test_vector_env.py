@@ -10,31 +10,40 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from tests.support.adapters import play_both
 
+import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 from posse.adapters.vector_env import TeamVectorEnv
 
-TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
-BUSY: dict[str, Any] = {"scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True}
-BUSY |= {"arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "obstacle_radius": (0.4, 0.6)}
-BUSY |= {"start_distance": (1.0, 4.0)}
+SETTINGS: dict[str, Any] = {"scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True}
+SETTINGS |= {"arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "obstacle_radius": (0.4, 0.6)}
+SETTINGS |= {"start_distance": (1.0, 4.0)}
+BREAKS = {"breaks": 1, "break_window": (0.2, 0.4)}
+BUSY: dict[str, dict[str, Any]] = {
+    "Team": {**SETTINGS, **BREAKS},
+    "Solo": {**SETTINGS, "tracker_speed": 3.0},  # one alone runs into something only if it is fast
+    "Tracker": {**SETTINGS, **BREAKS, "scenario": "radio", "num_trackers": 3, "number": 1},
+}
 E = 4
 
 
-def vector(name: str = TEAM, **settings: Any) -> TeamVectorEnv:
+def vector(name: str = "posse/Team-v0", **settings: Any) -> TeamVectorEnv:
     env = gymnasium.make_vec(name, settings.pop("num_envs", E), vectorization_mode="vector_entry_point", **settings)
     assert isinstance(env, TeamVectorEnv)
     return env
 
 
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.value)
-@pytest.mark.parametrize("name", [TEAM, SOLO])
-@pytest.mark.parametrize("discrete", [False, True])
-def test_the_vector_environment_agrees_with_gymnasiums(name: str, mode: AutoresetMode, discrete: bool) -> None:
-    settings = {**BUSY, "discrete_actions": discrete}
-    if name == TEAM:
-        settings.update(breaks=1, break_window=(0.2, 0.4))
-    else:  # one alone runs into something only if it is fast
-        settings.update(tracker_speed=3.0)
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        *((name, {**BUSY[name], "discrete_actions": discrete}) for name in BUSY for discrete in (False, True)),
+        ("Tracker", {**BUSY["Tracker"], "silent": False}),
+    ],
+)
+def test_the_vector_environment_agrees_with_gymnasiums(
+    name: str, settings: dict[str, Any], mode: AutoresetMode
+) -> None:
+    name = f"posse/{name}-v0"
     ours = vector(name, autoreset=mode.name.lower(), **settings)
     theirs = SyncVectorEnv(
         [

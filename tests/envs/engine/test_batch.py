@@ -16,12 +16,8 @@ import posse
 
 
 def actions_for(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
-    """Return actions that depend on the world's index and the step alone."""
-    e = batch.first_world + np.arange(batch.num_worlds)[:, None, None]
-    i = np.arange(batch.action_shape[1])[:, None]
-    k = np.arange(batch.action_shape[2])
-    angles = 1.7 * e + 2.3 * i + 3.1 * k + 0.21 * step * (1 + i)
-    return np.asarray(np.sin(angles), np.float32)
+    """Return actions that depend on the step alone."""
+    return np.random.default_rng(step).uniform(-1, 1, batch.action_shape).astype(np.float32)
 
 
 def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:
@@ -98,18 +94,22 @@ def in_another_process(tmp_path: Path, name: str, steps: int, **environment: str
 
 
 # Eight worlds together and one alone: of the largest whole team, of one of which a few are chosen,
-# and of one of which many are.
-NINE: dict[str, dict[str, Any]] = {
-    "smart": {"num_trackers": 16, "num_neighbours": 15},
-    "constant": {"num_trackers": 10, "num_neighbours": 3},
-    "search": {"num_trackers": 11, "num_neighbours": 9},
+# and of one of which many are; two of the largest teams, by radio and among all that there can be.
+LARGEST: dict[str, Any] = {"num_trackers": 64, "num_neighbours": 63, "start_distance": (4.0, 40.0)}
+PLACE: dict[str, Any] = {"arena": 100.0, "num_obstacles": 60, "obstacle_gap": 0.3, "sonar_beams": 64}
+TEAMS: dict[str, tuple[int, dict[str, Any]]] = {
+    "smart": (9, {"num_trackers": 16, "num_neighbours": 15}),
+    "constant": (9, {"num_trackers": 10, "num_neighbours": 3}),
+    "search": (9, {"num_trackers": 11, "num_neighbours": 9}),
+    "radio": (1, {**LARGEST, "radio_range": 30.0}),
+    "duel": (1, {**LARGEST, **PLACE, "target_motion": "agent"}),
 }
 
 
 def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
     make: dict[str, Any] = {"seed": 11, "horizon": 25, "message_size": 1, "settle_time": 1.0}
-    worlds = 9 if name in NINE else 2
-    return play(posse.batch(name, worlds, **make, **NINE.get(name, {})), steps)
+    worlds, team = TEAMS.get(name, (2, {}))
+    return play(posse.batch(name, worlds, **{**make, **team}), steps)
 
 
 def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
@@ -124,6 +124,8 @@ def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
         pytest.param("accelerating", 30, marks=pytest.mark.long),
         pytest.param("constant", 3, marks=pytest.mark.long),
         pytest.param("search", 3, marks=pytest.mark.long),
+        pytest.param("radio", 1, marks=pytest.mark.long),
+        pytest.param("duel", 1, marks=pytest.mark.long),
     ],
 )
 def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.envs.engine.test_batch import actions_for
 from tests.support.reference.state import snapshot
 
 import posse
@@ -24,10 +25,9 @@ def played(name: str, worlds: int = 3, steps: int = 40, **overrides: Any) -> pos
     return batch
 
 
-def actions_for(batch: posse.Batch, step: int, copies: int = 1) -> NDArray[np.float32]:
-    """Return the same actions for a batch and, repeated, for its copies."""
-    drawn = np.random.default_rng(step).uniform(-1, 1, batch.action_shape).astype(np.float32)
-    return np.repeat(drawn, copies, axis=0)
+def repeated(batch: posse.Batch, step: int) -> NDArray[np.float32]:
+    """Return the actions of a batch for two copies of it."""
+    return np.repeat(actions_for(batch, step), 2, axis=0)
 
 
 @pytest.mark.parametrize("name", [*NOTHING_DRAWN, *DRAWS])
@@ -39,7 +39,7 @@ def test_copies_draw_what_neither_their_original_nor_other_copies_draw(name: str
     np.testing.assert_array_equal(copies.observe(), np.repeat(batch.observe(), 2, axis=0))
     seen, own = [], []
     for step in range(100, 500 if name == "leader-loss" else 130):
-        seen.append(copies.step(actions_for(batch, step, 2))[0])
+        seen.append(copies.step(repeated(batch, step))[0])
         own.append(batch.step(actions_for(batch, step))[0])
     first, second, original = np.stack(seen)[:, ::2], np.stack(seen)[:, 1::2], np.stack(own)
     for one, other in ((first, original), (second, original), (first, second)):
@@ -51,7 +51,7 @@ def test_what_copies_draw_follows_from_seed_and_step() -> None:
         batch = played("field", steps=steps)
         copies = batch.copies(2, seed=seed, into=into)
         for step in range(20):
-            seen = copies.step(actions_for(batch, step, 2))[0]
+            seen = copies.step(repeated(batch, step))[0]
         return seen
 
     used = played("field", 6)
@@ -64,7 +64,7 @@ def test_the_episode_after_a_copy_s_end_is_no_world_s() -> None:
     copies = batch.copies(2)
     for step in range(2):
         batch.step(actions_for(batch, step))
-        copies.step(actions_for(batch, step, 2))
+        copies.step(repeated(batch, step))
     assert (copies.worlds["step"] == 0).all()
     assert len({*batch.worlds["x"].tolist(), *copies.worlds["x"].tolist()}) == 6
 

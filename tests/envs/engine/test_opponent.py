@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from tests.envs.engine.test_batch import actions_for
 
 import posse
 
@@ -29,10 +30,6 @@ class Weaver:
 
     def restart(self, memory: Any, mask: Any) -> Any:
         return np.where(mask, 0, memory)
-
-
-def actions_of(step: int, shape: tuple[int, ...] = (WORLDS, 2, 2)) -> Any:
-    return np.random.default_rng(step).uniform(-1, 1, shape).astype(np.float32)
 
 
 class Crossing(Weaver):
@@ -65,7 +62,7 @@ def test_it_plays_as_a_batch_whose_other_side_is_driven_from_outside(side: str, 
         moves, age = policy.act(theirs[:, other], age)
         if autoreset == "next_step":
             age[over] = 0
-        action, whole = actions_of(step, inside.action_shape), np.zeros(outside.action_shape, np.float32)
+        action, whole = actions_for(inside, step), np.zeros(outside.action_shape, np.float32)
         whole[:, own, :2], whole[:, other, : moves.shape[2]] = action, moves
         mine, rewards, _, truncated, infos = inside.step(action)
         theirs, gained, _, ended, told = outside.step(whole)
@@ -80,10 +77,10 @@ def test_it_plays_as_a_batch_whose_other_side_is_driven_from_outside(side: str, 
 def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
     batch = posse.batch(SHORT, WORLDS, target_policy=Weaver())
     batch.reset()
-    batch.step(actions_of(0))
+    batch.step(actions_for(batch, 0))
     copy = deepcopy(batch)  # by way of pickling
     for step in range(1, 5):
-        np.testing.assert_array_equal(copy.step(actions_of(step))[0], batch.step(actions_of(step))[0])
+        np.testing.assert_array_equal(copy.step(actions_for(copy, step))[0], batch.step(actions_for(batch, step))[0])
     np.testing.assert_array_equal(batch.restore(batch.save()), batch.observe())
 
 
@@ -101,7 +98,7 @@ def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
     observation, _ = env.reset(seed=5)
     for step in range(HORIZON):
         np.testing.assert_array_equal(np.reshape(observation, expected.shape), expected)
-        action = actions_of(step, (1, 2, 2))
+        action = actions_for(batch, step)
         expected, rewards, *_ = batch.step(action)
         observation, reward, *_ = env.step(action if vector else action[0])
         assert np.asarray(reward).item() == pytest.approx(rewards.mean())
@@ -133,7 +130,7 @@ def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) ->
     policy = Wrong(returned)
     batch: Any = posse.batch(SHORT, WORLDS, seed=1, target_policy=policy)
     vector: Any = gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy)
-    action = actions_of(0)
+    action = actions_for(batch, 0)
     for env, inner in ((batch, batch), (vector, vector.batch)):
         env.reset(seed=1)
         policy.returned = np.zeros((WORLDS, 1, 2))
@@ -155,8 +152,8 @@ def test_clipping_is_for_both_sides() -> None:
     clipping.reset()
     clipped.reset()
     for step in range(5):
-        seen = clipping.step(9 * actions_of(step))[0]
-        np.testing.assert_array_equal(seen, clipped.step((9 * actions_of(step)).clip(-1, 1))[0])
+        actions = 9 * actions_for(clipping, step)
+        np.testing.assert_array_equal(clipping.step(actions)[0], clipped.step(actions.clip(-1, 1))[0])
 
 
 def test_an_object_that_is_no_target_policy_is_refused() -> None:

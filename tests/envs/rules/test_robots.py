@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.support.reference.state import directions, points
 
 import posse
 from posse import Batch
@@ -67,9 +68,7 @@ def test_own_poses_drift_as_random_walks() -> None:
     batch = posse.batch("constant", 300, odometry_drift=0.1, heading_drift=0.03)
     batch.reset()
     v = batch.layout.views(drive(batch, 100))
-    heading = np.arctan2(batch.state["tracker_heading_sin"], batch.state["tracker_heading_cos"])
-    known = np.arctan2(*np.moveaxis(v["heading"][-1], -1, 0)[::-1])
-    turned = np.angle(np.exp(1j * (known - heading)))
+    turned = np.angle(v["heading"][-1] @ [1, 1j] / directions(batch, "tracker"))
     for error, wanted in (
         (v["position"][-1, ..., 0] - batch.state["tracker_x"], 0.1),
         (v["position"][-1, ..., 1] - batch.state["tracker_y"], 0.1),
@@ -82,35 +81,25 @@ def test_own_poses_drift_as_random_walks() -> None:
 def test_what_a_robot_reports_is_placed_by_its_believed_pose() -> None:
     batch = posse.batch("constant", 20, odometry_drift=0.2, heading_drift=0.1)
     batch.reset()
-    v, t = batch.layout.views(drive(batch, 50)[-1]), batch.arrays.tracker
-
-    def common(ego: npt.NDArray[np.float32], heading: npt.NDArray[np.float32]) -> npt.NDArray[np.complex128]:
-        return (ego[..., 0] + 1j * ego[..., 1]) * (heading[..., 0] + 1j * heading[..., 1])
-
-    own = v["position"][..., 0] + 1j * v["position"][..., 1]
-    known, true = v["heading"][..., 0] + 1j * v["heading"][..., 1], t["heading_cos"] + 1j * t["heading_sin"]
+    v, true = batch.layout.views(drive(batch, 50)[-1]), directions(batch, "tracker")
+    own, known = v["position"] @ [1, 1j], v["heading"] @ [1, 1j]
     # Team-mates are where they say that they are.
-    others = own[..., None] + v["neighbour_range"] * common(v["neighbour_bearing"], v["heading"][..., None, :])
+    others = own[..., None] + v["neighbour_range"] * (v["neighbour_bearing"] @ [1, 1j]) * known[..., None]
     number = v["neighbour_number"].astype(int)
     told = np.take_along_axis(own[:, None], number.reshape(20, 1, -1), axis=2).reshape(number.shape)
     np.testing.assert_allclose(others, told, atol=1e-4)
     # Each sees the target truly from where it is; here all do.
-    w = batch.worlds
-    measured = v["target_range"] * (v["target_bearing"][..., 0] + 1j * v["target_bearing"][..., 1])
-    away = (w["x"] + 1j * w["y"])[:, None] - (t["x"] + 1j * t["y"])
-    np.testing.assert_allclose(measured, away / true, atol=1e-3)
-    ahead = (w["heading_cos"] + 1j * w["heading_sin"])[:, None] / true
-    np.testing.assert_allclose(v["target_heading"][..., 0] + 1j * v["target_heading"][..., 1], ahead, atol=1e-4)
+    away = points(batch, "world")[:, None] - points(batch, "tracker")
+    np.testing.assert_allclose(v["target_range"] * (v["target_bearing"] @ [1, 1j]), away / true, atol=1e-3)
+    np.testing.assert_allclose(v["target_heading"] @ [1, 1j], directions(batch, "world")[:, None] / true, atol=1e-4)
     assert np.abs(known - true).max() > 0.1
 
 
 def test_the_measured_heading_of_the_target_is_noisy_and_with_it_the_slot_frame() -> None:
     batch = posse.batch("constant", 200, heading_noise=0.1)
     v = batch.layout.views(batch.reset())
-    true = (batch.worlds["heading_cos"] + 1j * batch.worlds["heading_sin"])[:, None]
-    own = v["heading"][..., 0] + 1j * v["heading"][..., 1]
-    heading, frame = (v[name][..., 0] + 1j * v[name][..., 1] for name in ("target_heading", "target_frame"))
-    error = np.angle(heading * own / true)
+    own, heading, frame = (v[name] @ [1, 1j] for name in ("heading", "target_heading", "target_frame"))
+    error = np.angle(heading * own / directions(batch, "world")[:, None])
     # Trackers share the newest fix, and at the start each has its own.
     assert np.std(error) == pytest.approx(0.1, rel=0.1)
     np.testing.assert_allclose(frame, heading, atol=1e-6)  # ψ is the heading at the start

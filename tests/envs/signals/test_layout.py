@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.process import printed
 from tests.support.reference.senses import sonar
 from tests.support.reference.state import headings, one_world, positions, snapshot
 
@@ -106,27 +105,6 @@ def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
             outputs[0] = together.reset(options={"reset_mask": mask})
             for e in np.flatnonzero(mask):
                 expected[0][e] = alone[e].reset()[0]
-
-
-LARGEST = """
-import posse, numpy
-team = dict(num_trackers=64, num_neighbours=63, start_distance=(4.0, 40.0), num_threads=1)
-place = dict(arena=100.0, num_obstacles=60, obstacle_gap=0.3, sonar_beams=64)
-for worlds, settings in (
-    (1, dict(team, **place, target_motion="agent")),
-    (1, dict(team, radio_range=30.0)),
-    (8, dict(team, num_trackers=16, num_neighbours=9)),
-):
-    batch = posse.batch("smart", worlds, **settings)
-    batch.reset(seed=1)
-    batch.step(numpy.ones(batch.action_shape))
-"""
-
-
-@pytest.mark.long
-def test_the_largest_worlds_fit_their_memory() -> None:
-    """Compiled code does not check array bounds; plain Python does."""
-    printed("-W", "ignore", "-c", LARGEST, NUMBA_DISABLE_JIT="1")
 
 
 @pytest.mark.parametrize("worlds", [1, 8])

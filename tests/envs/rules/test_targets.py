@@ -1,10 +1,10 @@
-"""Behaviour of the smart target as documented in its module and docs/scenarios.md."""
+"""Target motions: constant, accelerating, smart (as documented in its module), and what lies in their way."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import posse
 Team = Callable[[posse.Batch], npt.NDArray[Any]]
 SPEED = 0.6
 """Of the target; that of the trackers is 1."""
+FAR_AWAY: dict[str, Any] = {"num_trackers": 1, "start_distance": (300.0, 400.0)}
 
 
 def steady(speed: float) -> Team:
@@ -32,16 +33,76 @@ def pursuing(batch: posse.Batch) -> Array:
     return np.stack([2 * speed - 1, turn], -1)
 
 
-def play(batch: posse.Batch, team: Team, steps: int) -> tuple[Complexes, Complexes, Array]:
-    """Return places and headings of the target and distances of the nearest tracker, (steps + 1, E)."""
-    target, heading, nearest = [], [], []
+class Played(NamedTuple):
+    """The targets at the start and after each step, (steps + 1, E), and the distance of the nearest tracker."""
+
+    place: Complexes
+    heading: Complexes
+    turn_rate: Array
+    nearest: Array
+
+
+def play(batch: posse.Batch, steps: int, team: Team | None = None) -> Played:
+    """Play so many steps; without a team, the trackers rest."""
+    rows = []
     for step in range(steps + 1):
         if step:
-            batch.step(team(batch))
-        target.append(points(batch, "world"))
-        heading.append(directions(batch, "world"))
-        nearest.append(np.abs(points(batch, "tracker") - target[-1][:, None]).min(axis=1))
-    return np.array(target), np.array(heading), np.array(nearest)
+            batch.step((team or steady(0.0))(batch))
+        place, turn_rate = points(batch, "world"), batch.state["world_turn_rate"].astype(float)
+        nearest = np.abs(points(batch, "tracker") - place[:, None]).min(axis=1)
+        rows.append((place, directions(batch, "world"), turn_rate, nearest))
+    return Played(*map(np.array, zip(*rows, strict=True)))
+
+
+def test_constant_goes_straight_at_its_speed() -> None:
+    batch = posse.batch("constant", 20, **FAR_AWAY)
+    batch.reset(seed=1)
+    places, courses, turns, _ = play(batch, 300)
+    steps = np.arange(301)[:, None]
+    np.testing.assert_allclose(places, places[0] + 0.06 * steps * courses[0], rtol=1e-4, atol=2e-3)
+    assert (np.abs(turns) < 1e-4).all()
+
+
+@pytest.mark.parametrize("limit", [0.3, 1.0, 3.0])
+def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
+    batch = posse.batch("accelerating", 200, target_turn_rate=limit, **FAR_AWAY)
+    batch.reset(seed=2)
+    places, courses, turns, _ = play(batch, 400)
+    assert np.abs(turns).max() <= limit
+    np.testing.assert_allclose(np.abs(courses), 1.0, rtol=1e-5)
+    # Continuous: each step is an arc of V dt, along the mean of the headings at its ends.
+    moves, middle = np.diff(places, axis=0), courses[1:] + courses[:-1]
+    swing = np.angle(courses[1:] / courses[:-1])
+    chord = 0.06 * np.sinc(swing / (2 * math.pi))
+    np.testing.assert_allclose(moves, chord * middle / np.abs(middle), rtol=1e-4, atol=3e-5)
+    np.testing.assert_allclose(swing, turns[1:] * 0.1, rtol=1e-4, atol=3e-5)
+    assert (np.abs(turns).max(axis=0) > 0.3 * limit).all(), "every one of them turns"
+    assert (turns.max(axis=0) > 0).all()
+    assert (turns.min(axis=0) < 0).all()
+
+
+@pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
+@pytest.mark.parametrize(("name", "arena"), [("search", 20.0), ("obstacles", (30.0, 15.0)), ("field", 24.0)])
+def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, arena: Any, motion: str) -> None:
+    batch = posse.batch(name, 100, target_motion=motion, horizon=600, num_trackers=2, breaks=0, arena=arena)
+    batch.reset(seed=4)
+    places, courses, turns, nearest = play(batch, 595)
+    s = batch.scenario
+    room = np.minimum(s.half_sides[0] - np.abs(places.real), s.half_sides[1] - np.abs(places.imag))
+    if s.num_obstacles:
+        gaps = np.abs(places[..., None] - points(batch, "obstacle")) - batch.state["obstacle_radius"]
+        room = np.minimum(room, gaps.min(axis=-1))
+    assert room.min() - s.robot_radius > 0.09, "SAFE_MARGIN, rounding aside"
+    limit, step = s.target_turn_rate, s.target_speed * 0.1
+    assert np.abs(turns).max() <= limit * (1 + 1e-6)
+    moved = np.abs(np.diff(places, axis=0))
+    assert moved.max() <= step + 1e-5
+    np.testing.assert_allclose(moved[nearest[1:] > 0.5], step, atol=1e-3 * limit)
+    assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 * limit + 1e-5
+    assert np.median(np.abs(places - places[0]).max(axis=0)) > 4.0, "it gets about"
+
+
+# --- the smart target ----------------------------------------------------------------------------
 
 
 def start(worlds: int, motion: str = "smart", **poses: Any) -> posse.Batch:
@@ -58,8 +119,7 @@ def test_the_target_leaves_a_ring_by_the_widest_gap(team: Team) -> None:
     trackers = np.stack([4 * np.cos(bearings), 4 * np.sin(bearings), bearings + np.pi], -1)
     theta = np.random.default_rng(0).uniform(-np.pi, np.pi, 40)
     batch = start(40, tracker_pose=trackers, target_pose=np.stack([0 * theta, 0 * theta, theta], -1))
-    target, _, _ = play(batch, team, 35)
-    left = np.angle(target[-1] * np.exp(-1j * gaps))
+    left = np.angle(play(batch, 35, team).place[-1] * np.exp(-1j * gaps))
     assert np.abs(left).max() < np.radians(45)
     assert np.abs(left).mean() < np.radians(20)
 
@@ -69,7 +129,7 @@ def test_the_target_darts_at_a_team_in_formation_and_not_before() -> None:
     slots = np.array(posse.get_scenario("smart").slot_offsets) @ [1, 1j] * np.exp(1j * theta)[:, None]
     trackers = np.stack([slots.real, slots.imag, np.broadcast_to(theta[:, None], slots.shape)], -1)
     batch = start(24, tracker_pose=trackers, target_pose=np.stack([0 * theta, 0 * theta, theta], -1))
-    _, heading, _ = play(batch, steady(SPEED), 60)
+    heading = play(batch, 60, steady(SPEED)).heading
     away = np.abs(np.angle(heading / heading[0]))
     # Straight on (to one of sixteen headings) for the 3 s in which a team settles ...
     assert away[30].max() < np.radians(25)
@@ -84,14 +144,13 @@ def test_the_target_escapes_trackers_that_enclose_it() -> None:
     far = [[-15.0, y, 0.0] for y in (-2.0, 0.0, 2.0)]
     batch = start(1, tracker_pose=held + far, target_pose=[0.0, 0.0, 0.0])
     assert batch.state["world_touching"][0] != 0
-    _, _, nearest = play(batch, steady(0.0), 40)
-    assert nearest[-1, 0] > 1.0
+    assert play(batch, 40).nearest[-1, 0] > 1.0
 
 
 def test_the_smart_target_evades_longer_than_the_others() -> None:
     nearest, times = {}, {}
     for motion in ("smart", "constant", "accelerating"):
-        _, _, nearest[motion] = play(start(60, motion), pursuing, 400)  # from the same starts
+        nearest[motion] = play(start(60, motion), 400, pursuing).nearest  # from the same starts
         near = nearest[motion] < 0.5
         times[motion] = np.where(near.any(axis=0), near.argmax(axis=0), len(near)) * 0.1
     for other in ("constant", "accelerating"):
@@ -108,7 +167,7 @@ def test_the_target_flees_working_trackers_and_only_avoids_broken_ones() -> None
         batch = start(1, tracker_pose=[behind, *wings, fourth], target_pose=[0.0, 0.0, 0.0])
         batch.arrays.tracker["broken_at"][0, 1:] = 0
         batch.arrays.world["working"] = 1
-        target, heading, nearest = play(batch, pursuing, 60)
+        target, heading, _, nearest = play(batch, 60, pursuing)
         assert np.abs(np.angle(heading)).max() <= most
         assert nearest.min() > 0.301, "nothing touches it"
         assert target[-1, 0].real > 3.0

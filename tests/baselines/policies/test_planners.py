@@ -1,0 +1,151 @@
+"""The planners: scores above other teams, without access to future draws or to what no tracker is told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import posse
+from posse_baselines import PolicyError, batch_for, begin, load, play, rollout
+from posse_baselines.policies.belief_planner import BeliefPlanner, BeliefSettings
+from posse_baselines.policies.planner import Planner, PlannerSettings
+
+QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
+"""Looks ahead for a shorter time than it should."""
+QUICK_BELIEF = BeliefSettings(plan=PlannerSettings(look_ahead=0.8, keep=0.4, rounds=0))
+NEAR = (1.5, 4.0)
+
+
+def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.float32]:
+    """Return the actions (steps, E, N, 2 + m) of so many steps."""
+    return rollout(batch, planner, ["actions"], steps=steps)["actions"]
+
+
+@pytest.mark.long
+def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
+    metrics = play(posse.batch("constant", 10, split="train"), Planner(QUICK))
+    assert metrics["safe_score"].mean() >= 0.9 * metrics["bound"].mean()
+
+
+@pytest.mark.parametrize(
+    ("planner", "script", "scenario", "worlds", "settings"),
+    [
+        ("planner", "ddcs-distributed", "smart", 6, {"horizon": 300}),
+        ("planner", "ddcs-distributed", "robots", 6, {"horizon": 300}),
+        pytest.param("planner", "ddcs-distributed", "obstacles", 6, {"horizon": 300}, marks=pytest.mark.long),
+        ("belief-planner", "ddcs-tuned", "smart", 4, {"horizon": 160, "start_distance": NEAR}),
+    ],
+)
+def test_playing_ahead_is_worth_more_than_the_script(
+    planner: str, script: str, scenario: str, worlds: int, settings: dict[str, Any]
+) -> None:
+    planned, scripted = (
+        play(batch_for(team, posse.get_scenario(scenario, **settings), worlds, split="validation"), team)
+        for team in (load(planner), load(script))
+    )
+    assert planned["safe_score"].mean() >= scripted["safe_score"].mean() + 0.05
+    assert planned["contact_free"].all()
+
+
+def test_worlds_whose_episodes_begin_at_different_steps_are_played_as_alone() -> None:
+    planner, batch = Planner(QUICK), posse.batch("smart", 2, seed=1)
+    memory, observations = begin(planner, batch), batch.reset()
+    for step in range(23):
+        if step == 7:
+            mask = np.array([True, False])
+            observations = batch.reset(options={"reset_mask": mask})
+            memory = planner.restart(memory, mask)
+        actions, memory = planner.act(observations, memory)
+        observations = batch.step(actions)[0]
+    other = actions_of(Planner(QUICK), posse.batch("smart", 1, seed=1, first_world=1), 23)
+    np.testing.assert_array_equal(actions[1:], other[-1])
+
+
+def test_it_does_not_know_the_faults_to_come() -> None:
+    """Worlds that differ only in the future break of a tracker are played equally."""
+    planned = []
+    for when in (10, 500):
+        batch = posse.batch("leader-loss", 30, seed=3, start_distance=(1.5, 3.0))
+        planner, observations = Planner(), batch.reset()
+        batch.arrays.world["break_step"][:] = when
+        planned.append(planner.act(observations, begin(planner, batch))[0])
+    np.testing.assert_array_equal(planned[0], planned[1])
+
+
+def test_it_plays_beside_a_target_that_is_an_agent() -> None:
+    batch = posse.batch("smart", 2, target_motion="agent")
+    planner = Planner(QUICK)
+    observations = batch.reset()[:, :5]
+    memory = begin(planner, batch)
+    for _ in range(5):
+        actions, memory = planner.act(observations, memory)
+        assert actions.shape == (2, 5, 2)
+        target = np.full((2, 1, 2), 0.5, np.float32)
+        observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
+
+
+def test_the_planner_reads_only_the_batch_it_watches() -> None:
+    planner, other = load("planner"), posse.batch("smart", 3, num_trackers=3)
+    with pytest.raises(PolicyError, match=r"do not hold their state: show it the batch"):
+        planner.begin(other.layout, 3)
+    begin(planner, posse.batch("constant", 2))
+    with pytest.raises(PolicyError, match="watches 2 worlds of 'constant', not 3 of 'smart'"):
+        planner.begin(other.layout, 3)
+
+
+# --- the belief planner --------------------------------------------------------------------------
+
+
+def for_beliefs(scenario: str, worlds: int, **settings: Any) -> posse.Batch:
+    return posse.batch(scenario, worlds, message_size=load("belief-planner").message_size, **settings)
+
+
+def test_what_it_cannot_sense_changes_nothing() -> None:
+    """Of two teams one is in sight of the target in part; where it is from the others, what it plans and the faults
+    to come differ."""
+    played: list[list[Any]] = [[], []]
+    for hidden, actions in enumerate(played):
+        batch = for_beliefs("field", 4, seed=3, start_distance=(9.0, 20.0))
+        policy, observations = BeliefPlanner(QUICK_BELIEF), batch.reset()
+        memory, world = begin(policy, batch), batch.arrays.world
+        if hidden:
+            world["x"] += 0.5 * np.sign(world["x"])
+            world["heading_cos"], world["heading_sin"] = world["heading_sin"], world["heading_cos"].copy()
+            world["pressed"] = 2.0
+            batch.arrays.tracker["breaks_at"] = 50
+        for _ in range(15):
+            assert not batch.layout.views(observations)["target_known"].any()
+            acted, memory = policy.act(observations, memory)
+            actions.append(acted)
+            observations = batch.step(acted)[0]
+    np.testing.assert_array_equal(played[0], played[1])
+
+
+@pytest.mark.parametrize("motion", ["constant", "smart"])
+def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
+    """What a tracker is told is 0.3 s old; of a constant target it knows the present pose, of a smart one nearly so."""
+    late = {"sensing_range": 4.0, "radio_range": 9.0, "radio_delay": 3, "start_distance": (2.0, 6.0)}
+    batch = for_beliefs("smart", 8, seed=2, target_motion=motion, **late)
+    policy, observations = BeliefPlanner(QUICK_BELIEF), batch.reset()
+    memory, errors, ages = begin(policy, batch), [], []
+    for _ in range(40):
+        actions, memory = policy.act(observations, memory)
+        views, world = batch.layout.views(observations), batch.worlds
+        away = policy.annotations(memory)["estimate"][..., :2] - np.stack([world["x"], world["y"]], axis=-1)[:, None]
+        errors.append(np.linalg.norm(away, axis=-1))
+        ages.append(views["target_age"])
+        observations = batch.step(actions)[0]
+    only_told = np.array(ages) > 0.25
+    assert only_told.sum() > 50
+    wrong = np.array(errors)[only_told]
+    assert np.median(wrong) < 0.01
+    if motion == "constant":
+        assert wrong.max() < 1e-3
+
+
+def test_settings_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"fix_trust=0.0 must lie in \[0.01, 1\]"):
+        BeliefSettings(fix_trust=0.0)
