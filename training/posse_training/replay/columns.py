@@ -1,4 +1,4 @@
-"""The columns of a recorded episode, with names, resolutions and sources, and its events.
+"""The columns of a recorded episode, with names and sources, and its events.
 
 ========================== ================= ======================================================
 column                     shape of a row    what it holds
@@ -38,14 +38,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse_training.replay.episode import Column, Event
+from posse_training.replay.episode import Event
 
-_FINE: Final = 0.001  # m, rad, ...
-_ACTION: Final = 0.004
-_SCORE: Final = 0.0001
-_BELIEF: Final = 0.01
-_FIX: Final = 0.01  # m, of a measured position
-_OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
 _MARKS: Final = {
     "world_detected_at": ("detection", "target detected"),
     "world_settled_at": ("settled", "settled: every slot held"),
@@ -57,78 +51,72 @@ _TOUCHED: Final = {
     "world_contacts_target": "the target",
 }
 
-Arrays = Mapping[str, npt.NDArray[Any]]
+Array = npt.NDArray[Any]
+Arrays = Mapping[str, Array]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
 
 
 def columns_of(
     arrays: Arrays, layout: ObservationLayout, terms: Iterable[str], fields: Iterable[str]
-) -> dict[str, Column]:
+) -> dict[str, Array]:
     """Return the columns of an episode, whose annotations may be missing, with some reward terms and fields."""
     columns = _states(arrays, layout.scenario)
-    columns["action"] = Column(_last_kept(arrays["actions"])[..., :2], _ACTION)
+    columns["action"] = _last_kept(arrays["actions"])[..., :2]
     for name in terms:
         term = arrays[f"reward/{name}"]  # the first frame has no reward
-        columns[f"reward/{name}"] = _number_column(np.concatenate([np.zeros_like(term[:1]), term]), _FINE)
+        columns[f"reward/{name}"] = np.concatenate([np.zeros_like(term[:1]), term])
     for name, values in arrays.items():
         if name.startswith("annotation/"):
-            columns[f"belief/{name.removeprefix('annotation/')}"] = _number_column(_last_kept(values), _BELIEF)
+            columns[f"belief/{name.removeprefix('annotation/')}"] = _last_kept(values)
     views = layout.views(arrays["observations"])
     for name in fields:
-        columns[f"observation/{name}"] = _number_column(views[name], _OBSERVED.get(name, _FINE))
+        columns[f"observation/{name}"] = views[name]
     return columns
 
 
-def _last_kept(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _last_kept(rows: Array) -> Array:
     """Return T rows as T + 1; the last frame, which has no action, repeats the row before."""
     return np.concatenate([rows, rows[-1:]])
 
 
-def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
-    """Return a column that is stored exactly if its values are whole numbers."""
-    finite = values[np.isfinite(values)]
-    return Column(values, 1.0 if np.array_equal(finite, np.rint(finite)) else resolution)
+def _angle(arrays: Arrays, cosine: str, sine: str) -> Array:
+    return np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0)
 
 
-def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
-    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _FINE)
-
-
-def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
+def _states(states: Arrays, scenario: Scenario) -> dict[str, Array]:
     """Return the columns of the robots, the target and the radio."""
     step = states["world_step"][:, None]
     outage = max(1, round(scenario.outage_time / scenario.control_step))
 
-    def in_outage(name: str) -> Column:
+    def in_outage(name: str) -> Array:
         since = step.astype(np.int64) - states[name]
-        return Column((since >= 0) & (since < outage))
+        return (since >= 0) & (since < outage)
 
     columns = {
-        "tracker_x": Column(states["tracker_x"], _FINE),
-        "tracker_y": Column(states["tracker_y"], _FINE),
+        "tracker_x": states["tracker_x"],
+        "tracker_y": states["tracker_y"],
         "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
-        "tracker_sees": Column(states["tracker_sees"]),
-        "tracker_slot": Column(states["tracker_slot"]),
-        "tracker_broken": Column(states["tracker_broken_at"] <= step),
+        "tracker_sees": states["tracker_sees"],
+        "tracker_slot": states["tracker_slot"],
+        "tracker_broken": states["tracker_broken_at"] <= step,
         "tracker_sensor_dead": in_outage("tracker_sensor_dead_from"),
         "tracker_radio_dead": in_outage("tracker_radio_dead_from"),
-        "tracker_fix_step": Column(states["tracker_fix_step"]),
-        "tracker_fix_x": Column(states["tracker_fix_x"], _FIX),
-        "tracker_fix_y": Column(states["tracker_fix_y"], _FIX),
+        "tracker_fix_step": states["tracker_fix_step"],
+        "tracker_fix_x": states["tracker_fix_x"],
+        "tracker_fix_y": states["tracker_fix_y"],
         "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
-        "target_x": Column(states["world_x"], _FINE),
-        "target_y": Column(states["world_y"], _FINE),
+        "target_x": states["world_x"],
+        "target_y": states["world_y"],
         "target_heading": _angle(states, "world_heading_cos", "world_heading_sin"),
         "target_frame": _angle(states, "world_frame_cos", "world_frame_sin"),
-        "target_dart": Column(states["world_pressed"] < 0),
-        "score": Column(states["world_score"], _SCORE),
+        "target_dart": states["world_pressed"] < 0,
+        "score": states["world_score"],
     }
     if states["odometry_x"].size:
         for name in ("x", "y", "heading"):
-            believed = columns[f"tracker_{name}"].values + states[f"odometry_{name}"]
-            columns[f"believed_{name}"] = Column(believed, _FINE)
+            columns[f"believed_{name}"] = columns[f"tracker_{name}"] + states[f"odometry_{name}"]
     if states["heard_step"].size:
-        columns["heard_step"] = Column(states["heard_step"])
+        columns["heard_step"] = states["heard_step"]
     return columns
 
 
@@ -168,7 +156,7 @@ def find_events(states: Arrays) -> tuple[Event, ...]:
     return tuple(sorted(found, key=lambda event: event.step))
 
 
-def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def majority(leaders: Array) -> Array:
     """Return whom more than half of a team follow, (E,) of the leader of each tracker, (E, N); -1: there is none."""
     n = leaders.shape[1]
     middle = np.sort(leaders, axis=1)[:, n // 2]  # a leader of more than half stands there

@@ -7,8 +7,6 @@ other files. Data are deflated. External text (names, cards, settings) is writte
 from __future__ import annotations
 
 import base64
-import html
-import json
 import re
 import shlex
 import zlib
@@ -17,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+import jinja2
 import numpy as np
 import numpy.typing as npt
 
@@ -63,11 +62,7 @@ MODULES: Final = tuple(
 """Modules of the page's code, each after those that it imports from."""
 _IMPORT: Final = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
-_DATA: Final = re.compile(
-    r'<script type="application/json" id="header">(.*?)</script>\s*'
-    r'<script type="text/plain" id="data">(.*?)</script>',
-    re.DOTALL,
-)
+_DATA: Final = re.compile('<script type="text/plain" id="data">(.*?)</script>')
 
 _CAUSES: Final = ("dart", "contact", "break")
 _MOST: Final = 0.6  # of a difference: the cause of so much is named
@@ -104,28 +99,26 @@ def read_replay(path: str | Path) -> Replay:
         found = _DATA.search(text)
         if found is None:
             raise SettingsError("it is no replay: posse replay writes one")
-        return decode(found[1], base64.b64decode(found[2], validate=True))
+        return decode(base64.b64decode(found[1], validate=True))
     except (OSError, ValueError, TypeError, KeyError, zlib.error) as error:
         raise SettingsError(f"cannot read a replay from {path}: {error}") from error
 
 
 def page(replay: Replay) -> str:
     """Return the page's HTML."""
-    header, data = encode(replay)
     names = " and ".join(player.name for player in replay.players)
     values = {
-        "title": html.escape(f"{names} on {replay.world['scenario']}"),
-        "verdict": html.escape(verdict(replay)),
-        "command": html.escape(command(replay)),
+        "title": f"{names} on {replay.world['scenario']}",
+        "verdict": verdict(replay),
+        "command": command(replay),
         "project": PROJECT,
         "style": _file("style.css"),
-        "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
-        "header": _as_data(header),
-        "data": base64.b64encode(data).decode(),
+        "colours": colours(),
+        "data": base64.b64encode(encode(replay)).decode(),
         "code": _code(),
     }
-    # In one pass, so that inserted text is not searched again.
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    return environment.from_string(_file("index.html")).render(values)
 
 
 def _code() -> str:
@@ -147,13 +140,6 @@ def colours() -> dict[str, Any]:
         "DARK": {name: css(colour) for name, colour in DARK.items()}
         | {"PLAYERS": [css(colour) for colour in DARK_PLAYERS]},
     }
-
-
-def _as_data(text: str) -> str:
-    """Return equivalent JSON that cannot be parsed as markup in a page."""
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return text
 
 
 def _file(name: str) -> str:
@@ -186,7 +172,7 @@ def command(replay: Replay) -> str:
 
 def _scores(player: Player) -> npt.NDArray[np.float64]:
     """Return the score of each step, (T,)."""
-    return np.asarray(player.columns["score"].values[1:], np.float64)
+    return np.asarray(player.columns["score"][1:], np.float64)
 
 
 def _losses(player: Player) -> tuple[dict[str, float], dict[str, int]]:
