@@ -98,8 +98,9 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
 
 def test_the_world_is_described() -> None:
     world = short().world
-    assert (world["scenario"], world["seed"], world["split"], world["world"]) == ("field", 3, "test", 1)
-    assert world["version"] == posse.get_scenario("field").version
+    assert (world["seed"], world["split"], world["world"]) == (3, "test", 1)
+    field = posse.get_scenario("field")
+    assert (world["settings"]["name"], world["settings"]["version"]) == ("field", field.version)
     assert world["changed"] == {"num_trackers": [5, 4]}
     batch = posse.batch("field", 1, seed=3, split="test", first_world=1, num_trackers=4)
     batch.reset()

@@ -31,7 +31,8 @@ Rows are the trackers, followed by the target if it is an agent.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -56,22 +57,18 @@ Arrays = Mapping[str, Array]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
 
 
-def columns_of(
-    arrays: Arrays, layout: ObservationLayout, terms: Iterable[str], fields: Iterable[str]
-) -> dict[str, Array]:
-    """Return the columns of an episode, whose annotations may be missing, with some reward terms and fields."""
+def columns_of(arrays: Arrays, layout: ObservationLayout, world: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the columns of an episode, with the reward terms and fields that its world describes."""
     columns = _states(arrays, layout.scenario)
     columns["action"] = _last_kept(arrays["actions"])[..., :2]
-    for name in terms:
-        term = arrays[f"reward/{name}"]  # the first frame has no reward
-        columns[f"reward/{name}"] = np.concatenate([np.zeros_like(term[:1]), term])
+    for entry in world["terms"]:
+        term = arrays[f"reward/{entry['name']}"]  # the first frame has no reward
+        columns[f"reward/{entry['name']}"] = np.concatenate([np.zeros_like(term[:1]), term])
     for name, values in arrays.items():
         if name.startswith("annotation/"):
             columns[f"belief/{name.removeprefix('annotation/')}"] = _last_kept(values)
     views = layout.views(arrays["observations"])
-    for name in fields:
-        columns[f"observation/{name}"] = views[name]
-    return columns
+    return columns | {f"observation/{entry['name']}": views[entry["name"]] for entry in world["fields"]}
 
 
 def _last_kept(rows: Array) -> Array:
@@ -92,18 +89,12 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Array]:
         since = step.astype(np.int64) - states[name]
         return (since >= 0) & (since < outage)
 
-    columns = {
-        "tracker_x": states["tracker_x"],
-        "tracker_y": states["tracker_y"],
+    kept = [f"tracker_{name}" for name in ("x", "y", "sees", "slot", "fix_step", "fix_x", "fix_y")]
+    columns = {name: states[name] for name in kept} | {
         "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
-        "tracker_sees": states["tracker_sees"],
-        "tracker_slot": states["tracker_slot"],
         "tracker_broken": states["tracker_broken_at"] <= step,
         "tracker_sensor_dead": in_outage("tracker_sensor_dead_from"),
         "tracker_radio_dead": in_outage("tracker_radio_dead_from"),
-        "tracker_fix_step": states["tracker_fix_step"],
-        "tracker_fix_x": states["tracker_fix_x"],
-        "tracker_fix_y": states["tracker_fix_y"],
         "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
         "target_x": states["world_x"],
         "target_y": states["world_y"],
@@ -122,19 +113,17 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Array]:
 
 def find_events(states: Arrays) -> tuple[Event, ...]:
     """Return the events of an episode in order of time; ``annotation/leader`` (T, N) may be missing, -1: none."""
-    steps = np.arange(len(states["world_step"]))
     found = []
     for name, (kind, text) in _MARKS.items():
-        at = int(states[name][-1])
-        if 0 <= at < len(steps):
+        if (at := int(states[name][-1])) >= 0:
             found.append(Event(at, kind, text))
 
     darts = states["world_pressed"] < 0
-    begins = darts & ~np.concatenate([[False], darts[:-1]])
-    found += [Event(at, "dart", "the target darts") for at in steps[begins].tolist()]
+    begins = np.flatnonzero(darts & np.diff(darts, prepend=False))
+    found += [Event(at, "dart", "the target darts") for at in begins.tolist()]
 
     touching = states["tracker_onsets"] > 0
-    for at in steps[touching.any(axis=1)].tolist():
+    for at in np.flatnonzero(touching.any(axis=1)).tolist():
         robots = np.flatnonzero(touching[at]).tolist()
         names = " and ".join(f"tracker {i}" for i in robots)
         touched = [what for name, what in _TOUCHED.items() if states[name][at] > states[name][max(at - 1, 0)]]
@@ -146,13 +135,11 @@ def find_events(states: Arrays) -> tuple[Event, ...]:
         at = int(broken[:, i].argmax())
         found.append(Event(at, "break", f"tracker {i} breaks", (i,)))
 
-    last = -1
-    for at, leader in enumerate(majority(states.get("annotation/leader", np.empty((0, 1)))).tolist()):
-        if leader >= 0:
-            if last not in (-1, leader):
-                text = f"leader changes from tracker {last} to tracker {leader}"
-                found.append(Event(at, "leader", text, (last, leader)))
-            last = leader
+    leaders = majority(states.get("annotation/leader", np.empty((0, 1))))
+    for before, at in itertools.pairwise(np.flatnonzero(leaders >= 0).tolist()):
+        old, new = int(leaders[before]), int(leaders[at])
+        if old != new:
+            found.append(Event(at, "leader", f"leader changes from tracker {old} to tracker {new}", (old, new)))
     return tuple(sorted(found, key=lambda event: event.step))
 
 

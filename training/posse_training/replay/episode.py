@@ -78,7 +78,7 @@ class Replay:
 def _identity(world: dict[str, Any]) -> dict[str, Any]:
     """Return the data that are equal if two episodes are of the same world."""
     own = {key: world[key] for key in ("seed", "split", "world", "episode", "obstacles")}
-    return {**own, **{name: value for name, value in world["settings"].items() if name != "message_size"}}
+    return {**world["settings"], **own, "message_size": None}
 
 
 def join(replays: Sequence[Replay]) -> Replay:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from dataclasses import astuple
 from typing import Any, Final
 
 import numpy as np
@@ -50,7 +49,7 @@ def encode(replay: Replay) -> bytes:
             scale = resolution_of(name, values)
             columns.append({"name": name, "shape": values.shape[1:], "scale": scale})
             series.append(_series(name, values, scale))
-        events = [astuple(event) for event in player.events]
+        events = [vars(event) for event in player.events]
         players.append({**vars(player), "frames": player.frames, "events": events, "columns": columns})
         packed.append(_pack(np.concatenate(series)))
     header = _to_json({"format": FORMAT, "world": replay.world, "players": players})
@@ -78,7 +77,7 @@ def decode(data: bytes) -> Replay:
         for column, whole in zip(player["columns"], series, strict=True):
             values = np.where(whole == _MISSING, np.nan, whole * column["scale"])
             columns[column["name"]] = values.T.reshape(frames, *column["shape"])
-        events = tuple(Event(step, kind, text, tuple(robots)) for step, kind, text, robots in player["events"])
+        events = tuple(Event(**{**event, "robots": tuple(event["robots"])}) for event in player["events"])
         players.append(Player(**{**player, "columns": columns, "events": events}))
     return Replay(header["world"], tuple(players))
 

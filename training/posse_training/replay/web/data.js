@@ -75,8 +75,7 @@ export async function readReplay() {
     let place = 0;
     const columns = new Map(player.columns.map((described, k) =>
       [described.name, new Column(described, frames, series.subarray(place, (place += sizes[k])))]));
-    const events = player.events.map(([step, kind, text, robots]) => ({ step, kind, text, robots }));
-    Object.assign(player, { number, columns, events, last: frames - 1 });
+    Object.assign(player, { number, columns, last: frames - 1 });
     player.scores = scoresOf(player, world.settings.control_step);
   });
   return { world, players, last: Math.max(...players.map((player) => player.last)) };
