@@ -23,9 +23,9 @@ from matplotlib.lines import Line2D
 
 import posse
 from posse_baselines import Trajectory
-from posse_training.reproduce.figures import TARGET, draw_robots, look_of
+from posse_training.reproduce.figures import TARGET, draw_robots, finish, look_of, robot_lines
 from posse_training.reproduce.runs import played, relative, run_of, slot_error, times
-from posse_training.style import RC, note
+from posse_training.style import RC
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
 SEED: Final = 7
@@ -63,16 +63,12 @@ def draw(law: Law) -> Figure:
     _tracks(middle, run)
     _kept(right, run, law.keeps)
     middle.set_title(f"{law.policy}, {SECONDS:g} s", loc="left")
-    number = scenario.num_trackers
-    handles = [Line2D([], [], lw=1.3, label=f"tracker {n}", **look_of(n)) for n in range(number)]
-    handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
-    note(figure, f"world 0 of {played(scenario, SEED)}; starts 2 to 4 m from the target")
-    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
-    return figure
+    handles = [*robot_lines(scenario.num_trackers, "tracker"), Line2D([], [], color=TARGET, lw=1.0, label="target")]
+    return finish(figure, handles, 6, f"world 0 of {played(scenario, SEED)}; starts 2 to 4 m from the target")
 
 
 def _tracks(axes: Axes, run: Trajectory) -> None:
-    draw_robots(axes, run, 0, run.steps)
+    draw_robots(axes, run, run.steps)
     points = np.vstack([run["tracker_pose"][:, 0, :, :2].reshape(-1, 2), run["target_pose"][:, 0, :2]])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     reach = 0.4 + float(np.abs(points - middle).max())

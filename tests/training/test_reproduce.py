@@ -7,7 +7,7 @@ import pytest
 
 import posse
 from posse_baselines import Trajectory
-from posse_training.reproduce.reproduce import MEMBERS, MODELS, Settings, reproduce
+from posse_training.reproduce.reproduce import MEMBERS, MODELS, reproduce
 from posse_training.reproduce.runs import Floats, draw_starts, settling_times
 
 
@@ -44,17 +44,17 @@ def test_a_team_that_still_moves_at_the_end_has_not_settled() -> None:
 
 def test_starts_are_the_figures() -> None:
     scenario = posse.get_scenario("paper-centralized")
-    trackers, targets = draw_starts(scenario, 20, seed=3)
+    starts = draw_starts(scenario, 20, seed=3)
+    trackers, targets = starts["tracker_pose"], starts["target_pose"]
     assert trackers.shape == (20, 5, 3)
     assert (trackers[..., 0] > targets[:, None, 0]).all()
     np.testing.assert_array_equal(targets[:, 2], np.pi)
-    few, _ = draw_starts(scenario, 5, seed=3)
-    np.testing.assert_array_equal(few, trackers[:5])
+    np.testing.assert_array_equal(draw_starts(scenario, 5, seed=3)["tracker_pose"], trackers[:5])
 
 
 @pytest.mark.long
 def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
-    rows = reproduce(Settings(out=tmp_path, starts=8))
+    rows = reproduce(tmp_path, starts=8)
     written = json.loads((tmp_path / "settling.json").read_text())
     assert written["policies"] == rows
     names = [f"{model.name}-{kind}" for model in MODELS for kind in ("frames", "curves")]

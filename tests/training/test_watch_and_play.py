@@ -105,7 +105,7 @@ def test_the_arrows_drive_a_robot_and_the_last_round_is_recorded(
     assert "replay: " in capsys.readouterr().out
     player = read_replay(out).players[0]
     assert player.frames == 7
-    speed, turn = player.columns["action"].values[:, row, :2].astype(float)[:6].T
+    speed, turn = player.columns["action"][:, row, :2].astype(float)[:6].T
     assert turn.tolist() == pytest.approx([0, 0, 1, -1, 0, 0], abs=1e-3)
     assert speed.tolist() == pytest.approx([1, 1, 0.8, 0.8, 0.8, 0.8], abs=1e-3)
 

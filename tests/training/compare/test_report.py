@@ -53,7 +53,7 @@ def test_replays_are_of_the_worlds_with_the_largest_differences(found: Compariso
         assert re.fullmatch(r"[\w.-]+", file)
         replay = read_replay(found.folder / file)
         assert [player.name for player in replay.players] == ["pursuit", one.policy]
-        assert (replay.world["world"], replay.world["scenario"]) == (one.world, "constant")
+        assert (replay.world["world"], replay.world["settings"]["name"]) == (one.world, "constant")
         assert [player.metrics["safe_score"] for player in replay.players] == [one.baseline, one.mine]
 
 

@@ -64,7 +64,7 @@ def test_a_comparison_plays_every_team_against_the_target(
 
 def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None:
     replay = record(["pursuit"], SHORT, target=str(file), seconds=2.0)
-    actions = replay.players[0].columns["action"].values
+    actions = replay.players[0].columns["action"]
     assert actions.shape[1] == SHORT.num_trackers + 1, "the target's action as well"
     film = tmp_path / "film.gif"
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--set", "num_trackers=3"]

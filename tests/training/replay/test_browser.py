@@ -16,6 +16,7 @@ import posse
 from posse.rendering.style import GROUND, PAPER, TARGET
 from posse_baselines import Recorder
 from posse_training.replay import RECORD, read_replay, record, replay_of, write_replay
+from posse_training.replay.format import resolution_of
 from posse_training.replay.page import DARK, command, verdict
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def test_every_number_of_a_replay_reaches_the_page(browser: Browser, written: Pa
     with opened(browser, written, "#t=0") as page:
         for k, player in enumerate(read_replay(written).players):
             assert state(page, f"players[{k}].name") == player.name
-            for name, column in player.columns.items():
+            for name, values in player.columns.items():
                 found = page.evaluate(
                     """([k, name, frame]) => {
                         const column = window.replay.app.players[k].columns.get(name);
@@ -64,13 +65,13 @@ def test_every_number_of_a_replay_reaches_the_page(browser: Browser, written: Pa
                     }""",
                     [k, name, 123],
                 )
-                np.testing.assert_allclose(found, column.values[123].ravel(), rtol=0, atol=1e-9, err_msg=name)
+                np.testing.assert_allclose(found, values[123].ravel(), rtol=0, atol=1e-9, err_msg=name)
                 sums = page.evaluate(
                     """([k, name]) => window.replay.app.players[k].columns.get(name).series
                         .reduce((sum, value, i) => sum + value * ((i % 97) + 1), 0)""",
                     [k, name],
                 )
-                series = np.rint(column.values / column.resolution).reshape(player.frames, -1).T
+                series = np.rint(values / resolution_of(name, values)).reshape(player.frames, -1).T
                 assert sums == (series.ravel() * (np.arange(series.size) % 97 + 1)).sum(), name
 
 
@@ -139,7 +140,7 @@ def test_where_poses_drift_each_tracker_has_a_ghost_in_the_pose_that_it_believes
     browser: Browser, tmp_path: Path
 ) -> None:
     replay = record(["idle"], "robots", odometry_drift=0.4, seconds=20, observations=False)
-    believed = [replay.players[0].columns[f"believed_{k}"].values[200] for k in "xy"]
+    believed = [replay.players[0].columns[f"believed_{k}"][200] for k in "xy"]
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=20") as page:
         page.locator("#views canvas").hover()
         page.mouse.wheel(0, 300)  # so that all are in view
@@ -169,7 +170,7 @@ def test_keys_seek_and_the_picture_follows_the_data(browser: Browser, written: P
         for frame in (0, 90, 200):
             page.evaluate(f"window.replay.set({{ position: {frame} }})")
             picture = drawn(page, tmp_path / "view.png")
-            place = [float(player.columns[f"target_{k}"].values[frame]) for k in ("x", "y")]
+            place = [float(player.columns[f"target_{k}"][frame]) for k in ("x", "y")]
             wanted = np.array(page.evaluate(f"{look}({place[0]}, {place[1]})"))
             assert np.abs(centre_of(picture, TARGET) - wanted).max() < 8
 
@@ -200,7 +201,7 @@ def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) ->
     replay = read_replay(written)
     with opened(browser, written, "#t=0") as page:
         page.evaluate("window.replay.set({ position: 60 })")
-        x, y = (float(replay.players[0].columns[f"tracker_{k}"].values[60, 2]) for k in "xy")
+        x, y = (float(replay.players[0].columns[f"tracker_{k}"][60, 2]) for k in "xy")
         place = page.evaluate(f"window.replay.look(0).project({x}, {y})")
         page.locator("#views canvas").first.click(position={"x": place[0], "y": place[1]})
         assert state(page, "selected") == 2
@@ -211,7 +212,7 @@ def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) ->
         cells = row.locator("td").all_inner_texts()
         assert cells[0] == "m"
         for cell, player in zip(cells[1:], replay.players, strict=True):
-            told = player.columns["observation/target_range"].values[60, 2]
+            told = player.columns["observation/target_range"][60, 2]
             assert cell == ("not known" if told == -1 else f"{told:.2f}")
         page.keyboard.press("3")
         assert page.locator("#panel h2").inner_text().startswith("tracker 3")
@@ -222,7 +223,7 @@ def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) ->
 
 def test_the_safe_score_stops_at_the_first_contact(browser: Browser, tmp_path: Path) -> None:
     replay = record(["pursuit", "idle"], "obstacles", world=3, seconds=30, observations=False)
-    scores = [player.columns["score"].values for player in replay.players]
+    scores = [player.columns["score"] for player in replay.players]
     touches = [
         next((event.step for event in player.events if event.kind == "contact"), 10**6) for player in replay.players
     ]
@@ -272,7 +273,7 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
     place: dict[str, Any] = {"arena": (26.0, 16.0), "num_obstacles": 12, "obstacle_gap": 0.8, "observations": False}
     sight: dict[str, Any] = {"field_of_view": view, "sensing_range": reach}
     replay = record(["ddcs-distributed"], "obstacles", seed=2, **place, **sight)
-    sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
+    sees = replay.players[0].columns["tracker_sees"].astype(bool)
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=0") as page:
         inside = page.evaluate("""() => {
             const { app, sightOf } = window.replay;

@@ -15,6 +15,7 @@ from tests.support.replays import ATTACK, hostile, short
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
+from posse_training.replay.format import resolution_of
 from posse_training.replay.page import page, verdict
 
 
@@ -34,9 +35,9 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert back.world == short().world
     for mine, theirs in zip(back.players, short().players, strict=True):
         assert (mine.name, mine.events, mine.about) == (theirs.name, theirs.events, theirs.about)
-        for name, column in theirs.columns.items():
-            off = np.abs(mine.columns[name].values - column.values.astype(np.float64))
-            assert off.max(initial=0) <= column.resolution * 0.501, name
+        for name, values in theirs.columns.items():
+            off = np.abs(mine.columns[name] - values.astype(np.float64))
+            assert off.max(initial=0) <= resolution_of(name, values) * 0.501, name
 
 
 def test_a_page_loads_nothing() -> None:

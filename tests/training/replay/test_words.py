@@ -10,7 +10,7 @@ import pytest
 from tests.support.replays import hostile, short
 
 from posse_training.cli import main
-from posse_training.replay import Column, Event, Player, Replay, read_replay, record, write_replay
+from posse_training.replay import Event, Player, Replay, read_replay, record, write_replay
 from posse_training.replay.page import command, verdict
 
 WAY = [0.0] * 10
@@ -18,9 +18,7 @@ FULL = [1.0] * 40
 
 
 def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
-    return Player(
-        name, {"score": Column(np.array([0.0, *scores]))}, tuple(Event(step, kind, "") for step, kind in events)
-    )
+    return Player(name, {"score": np.array([0.0, *scores])}, tuple(Event(step, kind, "") for step, kind in events))
 
 
 @pytest.mark.parametrize(

@@ -2,19 +2,8 @@
 
 from __future__ import annotations
 
-from posse_training.replay.episode import Column, Event, Player, Replay, join
+from posse_training.replay.episode import Event, Player, Replay, join
 from posse_training.replay.page import read_replay, write_replay
 from posse_training.replay.recording import RECORD, record, replay_of
 
-__all__ = [
-    "RECORD",
-    "Column",
-    "Event",
-    "Player",
-    "Replay",
-    "join",
-    "read_replay",
-    "record",
-    "replay_of",
-    "write_replay",
-]
+__all__ = ["RECORD", "Event", "Player", "Replay", "join", "read_replay", "record", "replay_of", "write_replay"]

@@ -1,4 +1,4 @@
-"""The columns of a recorded episode, with names, resolutions and sources, and its events.
+"""The columns of a recorded episode, with names and sources, and its events.
 
 ========================== ================= ======================================================
 column                     shape of a row    what it holds
@@ -31,21 +31,16 @@ Rows are the trackers, followed by the target if it is an agent.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse_training.replay.episode import Column, Event
+from posse_training.replay.episode import Event
 
-_FINE: Final = 0.001  # m, rad, ...
-_ACTION: Final = 0.004
-_SCORE: Final = 0.0001
-_BELIEF: Final = 0.01
-_FIX: Final = 0.01  # m, of a measured position
-_OBSERVED: Final = {"sonar": 0.05, "neighbour_message": 1 / 512}  # of fields; the others: _FINE
 _MARKS: Final = {
     "world_detected_at": ("detection", "target detected"),
     "world_settled_at": ("settled", "settled: every slot held"),
@@ -57,95 +52,77 @@ _TOUCHED: Final = {
     "world_contacts_target": "the target",
 }
 
-Arrays = Mapping[str, npt.NDArray[Any]]
+Array = npt.NDArray[Any]
+Arrays = Mapping[str, Array]
 """Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
 
 
-def columns_of(
-    arrays: Arrays, layout: ObservationLayout, terms: Iterable[str], fields: Iterable[str]
-) -> dict[str, Column]:
-    """Return the columns of an episode, whose annotations may be missing, with some reward terms and fields."""
+def columns_of(arrays: Arrays, layout: ObservationLayout, world: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the columns of an episode, with the reward terms and fields that its world describes."""
     columns = _states(arrays, layout.scenario)
-    columns["action"] = Column(_last_kept(arrays["actions"])[..., :2], _ACTION)
-    for name in terms:
-        term = arrays[f"reward/{name}"]  # the first frame has no reward
-        columns[f"reward/{name}"] = _number_column(np.concatenate([np.zeros_like(term[:1]), term]), _FINE)
+    columns["action"] = _last_kept(arrays["actions"])[..., :2]
+    for entry in world["terms"]:
+        term = arrays[f"reward/{entry['name']}"]  # the first frame has no reward
+        columns[f"reward/{entry['name']}"] = np.concatenate([np.zeros_like(term[:1]), term])
     for name, values in arrays.items():
         if name.startswith("annotation/"):
-            columns[f"belief/{name.removeprefix('annotation/')}"] = _number_column(_last_kept(values), _BELIEF)
+            columns[f"belief/{name.removeprefix('annotation/')}"] = _last_kept(values)
     views = layout.views(arrays["observations"])
-    for name in fields:
-        columns[f"observation/{name}"] = _number_column(views[name], _OBSERVED.get(name, _FINE))
-    return columns
+    return columns | {f"observation/{entry['name']}": views[entry["name"]] for entry in world["fields"]}
 
 
-def _last_kept(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _last_kept(rows: Array) -> Array:
     """Return T rows as T + 1; the last frame, which has no action, repeats the row before."""
     return np.concatenate([rows, rows[-1:]])
 
 
-def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
-    """Return a column that is stored exactly if its values are whole numbers."""
-    finite = values[np.isfinite(values)]
-    return Column(values, 1.0 if np.array_equal(finite, np.rint(finite)) else resolution)
+def _angle(arrays: Arrays, cosine: str, sine: str) -> Array:
+    return np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0)
 
 
-def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
-    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _FINE)
-
-
-def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
+def _states(states: Arrays, scenario: Scenario) -> dict[str, Array]:
     """Return the columns of the robots, the target and the radio."""
     step = states["world_step"][:, None]
 
-    def in_outage(name: str) -> Column:
+    def in_outage(name: str) -> Array:
         since = step.astype(np.int64) - states[name]
-        return Column((since >= 0) & (since < scenario.outage_steps))
+        return (since >= 0) & (since < scenario.outage_steps)
 
-    columns = {
-        "tracker_x": Column(states["tracker_x"], _FINE),
-        "tracker_y": Column(states["tracker_y"], _FINE),
+    kept = [f"tracker_{name}" for name in ("x", "y", "sees", "slot", "fix_step", "fix_x", "fix_y")]
+    columns = {name: states[name] for name in kept} | {
         "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
-        "tracker_sees": Column(states["tracker_sees"]),
-        "tracker_slot": Column(states["tracker_slot"]),
-        "tracker_broken": Column(states["tracker_broken_at"] <= step),
+        "tracker_broken": states["tracker_broken_at"] <= step,
         "tracker_sensor_dead": in_outage("tracker_sensor_dead_from"),
         "tracker_radio_dead": in_outage("tracker_radio_dead_from"),
-        "tracker_fix_step": Column(states["tracker_fix_step"]),
-        "tracker_fix_x": Column(states["tracker_fix_x"], _FIX),
-        "tracker_fix_y": Column(states["tracker_fix_y"], _FIX),
         "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
-        "target_x": Column(states["world_x"], _FINE),
-        "target_y": Column(states["world_y"], _FINE),
+        "target_x": states["world_x"],
+        "target_y": states["world_y"],
         "target_heading": _angle(states, "world_heading_cos", "world_heading_sin"),
         "target_frame": _angle(states, "world_frame_cos", "world_frame_sin"),
-        "target_dart": Column(states["world_pressed"] < 0),
-        "score": Column(states["world_score"], _SCORE),
+        "target_dart": states["world_pressed"] < 0,
+        "score": states["world_score"],
     }
     if states["odometry_x"].size:
         for name in ("x", "y", "heading"):
-            believed = columns[f"tracker_{name}"].values + states[f"odometry_{name}"]
-            columns[f"believed_{name}"] = Column(believed, _FINE)
+            columns[f"believed_{name}"] = columns[f"tracker_{name}"] + states[f"odometry_{name}"]
     if states["heard_step"].size:
-        columns["heard_step"] = Column(states["heard_step"])
+        columns["heard_step"] = states["heard_step"]
     return columns
 
 
 def find_events(states: Arrays) -> tuple[Event, ...]:
     """Return the events of an episode in order of time; ``annotation/leader`` (T, N) may be missing, -1: none."""
-    steps = np.arange(len(states["world_step"]))
     found = []
     for name, (kind, text) in _MARKS.items():
-        at = int(states[name][-1])
-        if 0 <= at < len(steps):
+        if (at := int(states[name][-1])) >= 0:
             found.append(Event(at, kind, text))
 
     darts = states["world_pressed"] < 0
-    begins = darts & ~np.concatenate([[False], darts[:-1]])
-    found += [Event(at, "dart", "the target darts") for at in steps[begins].tolist()]
+    begins = np.flatnonzero(darts & np.diff(darts, prepend=False))
+    found += [Event(at, "dart", "the target darts") for at in begins.tolist()]
 
     touching = states["tracker_onsets"] > 0
-    for at in steps[touching.any(axis=1)].tolist():
+    for at in np.flatnonzero(touching.any(axis=1)).tolist():
         robots = np.flatnonzero(touching[at]).tolist()
         names = " and ".join(f"tracker {i}" for i in robots)
         touched = [what for name, what in _TOUCHED.items() if states[name][at] > states[name][max(at - 1, 0)]]
@@ -157,17 +134,15 @@ def find_events(states: Arrays) -> tuple[Event, ...]:
         at = int(broken[:, i].argmax())
         found.append(Event(at, "break", f"tracker {i} breaks", (i,)))
 
-    last = -1
-    for at, leader in enumerate(majority(states.get("annotation/leader", np.empty((0, 1)))).tolist()):
-        if leader >= 0:
-            if last not in (-1, leader):
-                text = f"leader changes from tracker {last} to tracker {leader}"
-                found.append(Event(at, "leader", text, (last, leader)))
-            last = leader
+    leaders = majority(states.get("annotation/leader", np.empty((0, 1))))
+    for before, at in itertools.pairwise(np.flatnonzero(leaders >= 0).tolist()):
+        old, new = int(leaders[before]), int(leaders[at])
+        if old != new:
+            found.append(Event(at, "leader", f"leader changes from tracker {old} to tracker {new}", (old, new)))
     return tuple(sorted(found, key=lambda event: event.step))
 
 
-def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def majority(leaders: Array) -> Array:
     """Return whom more than half of a team follow, (E,) of the leader of each tracker, (E, N); -1: there is none."""
     n = leaders.shape[1]
     middle = np.sort(leaders, axis=1)[:, n // 2]  # a leader of more than half stands there

@@ -19,19 +19,6 @@ MOST_PLAYERS: Final = 4
 
 
 @dataclass(frozen=True)
-class Column:
-    """One quantity over an episode.
-
-    Attributes:
-        values: (T + 1, ...), one row per frame; nan: no value in this frame.
-        resolution: A page stores the values to half of this. 1: they are whole numbers.
-    """
-
-    values: npt.NDArray[Any]
-    resolution: float = 1.0
-
-
-@dataclass(frozen=True)
 class Event:
     """An event marked on the timeline.
 
@@ -54,7 +41,7 @@ class Player:
 
     Attributes:
         name: Name on the page.
-        columns: Columns by name; :mod:`posse_training.replay.columns` lists them.
+        columns: (T + 1, ...) each, by name; :mod:`posse_training.replay.columns` lists them. nan: no value in a frame.
         events: Events in order of time.
         metrics: Every metric of the recorded part of the episode; nan: never happened.
         about: Description of the policy, such as the card of a learned one; plain JSON.
@@ -62,7 +49,7 @@ class Player:
     """
 
     name: str
-    columns: dict[str, Column]
+    columns: dict[str, npt.NDArray[Any]]
     events: tuple[Event, ...] = ()
     metrics: dict[str, float] = field(default_factory=dict)
     about: dict[str, Any] = field(default_factory=dict)
@@ -71,7 +58,7 @@ class Player:
     @property
     def frames(self) -> int:
         """T + 1, number of frames."""
-        return len(next(iter(self.columns.values())).values)
+        return len(next(iter(self.columns.values())))
 
 
 @dataclass(frozen=True)
@@ -91,7 +78,7 @@ class Replay:
 def _identity(world: dict[str, Any]) -> dict[str, Any]:
     """Return the data that are equal if two episodes are of the same world."""
     own = {key: world[key] for key in ("seed", "split", "world", "episode", "obstacles")}
-    return {**own, **{name: value for name, value in world["settings"].items() if name != "message_size"}}
+    return {**world["settings"], **own, "message_size": None}
 
 
 def join(replays: Sequence[Replay]) -> Replay:

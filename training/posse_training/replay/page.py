@@ -7,16 +7,17 @@ other files. Data are deflated. External text (names, cards, settings) is writte
 from __future__ import annotations
 
 import base64
-import html
-import json
+import itertools
 import re
 import shlex
 import zlib
 from collections import defaultdict
+from graphlib import TopologicalSorter
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+import jinja2
 import numpy as np
 import numpy.typing as npt
 
@@ -53,21 +54,9 @@ DARK: Final[dict[str, style.Colour]] = {
 }
 """Colours of the page where the browser prefers a dark scheme; the others are the same."""
 DARK_PLAYERS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), DARK["INK"], (60, 190, 150), (190, 120, 210))
-MODULES: Final = tuple(
-    f"{name}.js"
-    for name in (
-        *("data", "state", "drawing", "camera", "ground", "sensing", "robots", "view", "timeline"),
-        *("text", "panel", "legend", "controls", "main"),
-    )
-)
-"""Modules of the page's code, each after those that it imports from."""
-_IMPORT: Final = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
+_IMPORT: Final = re.compile(r'^import [^;]*? from "./(\w+)\.js";\n', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
-_DATA: Final = re.compile(
-    r'<script type="application/json" id="header">(.*?)</script>\s*'
-    r'<script type="text/plain" id="data">(.*?)</script>',
-    re.DOTALL,
-)
+_DATA: Final = re.compile('<script type="text/plain" id="data">(.*?)</script>')
 
 _CAUSES: Final = ("dart", "contact", "break")
 _MOST: Final = 0.6  # of a difference: the cause of so much is named
@@ -104,56 +93,46 @@ def read_replay(path: str | Path) -> Replay:
         found = _DATA.search(text)
         if found is None:
             raise SettingsError("it is no replay: posse replay writes one")
-        return decode(found[1], base64.b64decode(found[2], validate=True))
+        return decode(base64.b64decode(found[1], validate=True))
     except (OSError, ValueError, TypeError, KeyError, zlib.error) as error:
         raise SettingsError(f"cannot read a replay from {path}: {error}") from error
 
 
 def page(replay: Replay) -> str:
     """Return the page's HTML."""
-    header, data = encode(replay)
     names = " and ".join(player.name for player in replay.players)
     values = {
-        "title": html.escape(f"{names} on {replay.world['scenario']}"),
-        "verdict": html.escape(verdict(replay)),
-        "command": html.escape(command(replay)),
+        "title": f"{names} on {replay.world['settings']['name']}",
+        "verdict": verdict(replay),
+        "command": command(replay),
         "project": PROJECT,
         "style": _file("style.css"),
-        "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
-        "header": _as_data(header),
-        "data": base64.b64encode(data).decode(),
+        "colours": colours(),
+        "data": base64.b64encode(encode(replay)).decode(),
         "code": _code(),
     }
-    # In one pass, so that inserted text is not searched again.
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    return environment.from_string(_file("index.html")).render(values)
 
 
 def _code() -> str:
-    """Return the modules concatenated, without imports and the keyword "export"."""
-    modules = (_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in MODULES)
-    return "".join(f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True))
+    """Return the modules concatenated, each after those that it imports from, without imports and "export"."""
+    files = sorted((resources.files(__package__) / "web").iterdir(), key=lambda file: file.name)
+    modules = {file.name.removesuffix(".js"): file.read_text("utf-8") for file in files if file.name.endswith(".js")}
+    order = TopologicalSorter({name: _IMPORT.findall(text) for name, text in modules.items()}).static_order()
+    return "".join(f"// --- {name}.js ---\n{_EXPORT.sub('', _IMPORT.sub('', modules[name]))}\n" for name in order)
 
 
 def colours() -> dict[str, Any]:
     """Return the colours of figures and films for the page."""
-
-    def css(colour: style.Colour) -> str:
-        return "#" + "".join(f"{part:02x}" for part in colour)
-
+    css = "#{:02x}{:02x}{:02x}".format
     return {
-        **{name: css(colour) for name, colour in vars(style).items() if isinstance(colour, tuple)},
-        "TASKS": [css(colour) for colour in TASK_COLOURS],
-        "PLAYERS": [css(colour) for colour in PLAYERS],
-        "DARK": {name: css(colour) for name, colour in DARK.items()}
-        | {"PLAYERS": [css(colour) for colour in DARK_PLAYERS]},
+        **{name: css(*colour) for name, colour in vars(style).items() if isinstance(colour, tuple)},
+        "TASKS": [css(*colour) for colour in TASK_COLOURS],
+        "PLAYERS": [css(*colour) for colour in PLAYERS],
+        "DARK": {name: css(*colour) for name, colour in DARK.items()}
+        | {"PLAYERS": [css(*colour) for colour in DARK_PLAYERS]},
     }
-
-
-def _as_data(text: str) -> str:
-    """Return equivalent JSON that cannot be parsed as markup in a page."""
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return text
 
 
 def _file(name: str) -> str:
@@ -168,12 +147,12 @@ def verdict(replay: Replay) -> str:
     """
     step = replay.world["settings"]["control_step"]
     ranked = sorted(replay.players, key=lambda player: -_scores(player).mean())
-    parts = []
-    for place, player in enumerate(ranked):
-        share = f"{100 * _scores(player).mean():.0f} %"
+    parts: list[str] = []
+    for player in ranked:
         contact = next((event.step for event in player.events if event.kind == "contact"), None)
         after = "" if contact is None else f" (none counts from its contact at {contact * step:.1f} s on)"
-        parts.append(f"{player.name} {'' if place else 'held '}{share}{'' if place else ' of its slots'}{after}")
+        held = "{} {:.0f} %{}" if parts else "{} held {:.0f} % of its slots{}"
+        parts.append(held.format(player.name, 100 * _scores(player).mean(), after))
     reason = _reason(ranked[0], ranked[1]) if len(ranked) == 2 else ""
     return f"{', '.join(parts)}{reason}."
 
@@ -186,31 +165,28 @@ def command(replay: Replay) -> str:
 
 def _scores(player: Player) -> npt.NDArray[np.float64]:
     """Return the score of each step, (T,)."""
-    return np.asarray(player.columns["score"].values[1:], np.float64)
+    return np.asarray(player.columns["score"][1:], np.float64)
 
 
-def _losses(player: Player) -> tuple[dict[str, float], dict[str, int]]:
-    """Return by cause how many steps' worth of slots were free, and in how many events of it any were."""
-    scores = _scores(player)
-    lost, times = defaultdict[str, float](float), defaultdict[str, int](int)
+def _losses(player: Player) -> dict[str, list[float]]:
+    """Return by cause how many steps' worth of slots were free in each event of it."""
+    scores, free = _scores(player), defaultdict[str, list[float]](list)
     begins = {0: "way", int((scores >= scores.mean()).argmax()): ""}
     there = max(begins)
     begins |= {e.step - 1: e.kind for e in player.events if e.kind in _CAUSES and e.step - 1 > there}
-    steps = sorted(begins)
-    for first, end in zip(steps, [*steps[1:], len(scores)], strict=True):
-        free = float((1 - scores[first:end]).sum())
-        lost[begins[first]] += free
-        times[begins[first]] += free > 0
-    return lost, times
+    for first, end in itertools.pairwise([*sorted(begins), len(scores)]):
+        free[begins[first]].append(float((1 - scores[first:end]).sum()))
+    return free
 
 
 def _reason(first: Player, second: Player) -> str:
     """Return where most of what the second team fell behind the first arose; empty if nowhere in particular."""
-    (kept, _), (lost, times) = _losses(first), _losses(second)
-    behind = {cause: lost.get(cause, 0.0) - kept.get(cause, 0.0) for cause in dict.fromkeys((*lost, *kept))}
+    kept, lost = _losses(first), _losses(second)
+    behind = {cause: sum(lost[cause]) - sum(kept[cause]) for cause in (*lost, *kept)}
     total, cause = sum(behind.values()), max(behind, key=lambda cause: behind[cause])
     if not cause or total < 1 or behind[cause] < _MOST * total:
         return ""
-    count = f"{times[cause]} {cause}{'s' * (times[cause] != 1)}"
+    times = sum(slots > 0 for slots in lost[cause])
+    count = f"{times} {cause}{'s' * (times != 1)}"
     place = {"way": "on the way to the slots", "break": f"after {count}"}.get(cause, f"in {count}")
     return f"; most of the difference arose {place}"

@@ -114,7 +114,7 @@ def replay_of(
     fields = [field for field in one.layout.fields if observations or field.name == "sonar"]
     world = _describe_world(arrays, one, fields)
     metrics = {key: float(values[0]) for key, values in one.metrics.items()}
-    columns = columns_of(arrays, one.layout, world["weights"], [field.name for field in fields])
+    columns = columns_of(arrays, one.layout, world)
     return Replay(world, (Player(name, columns, find_events(arrays), metrics, dict(about or {})),))
 
 
@@ -134,12 +134,9 @@ def _describe_world(
 ) -> dict[str, Any]:
     """Return the common data of all players of a world, as plain JSON with infinite numbers."""
     scenario = trajectory.scenario
-    weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
     world = {
         "posse": posse.__version__,
         "commit": commit(),
-        "scenario": scenario.name,
-        "version": scenario.version,
         "settings": scenario.to_dict(),
         # The size of a message is set by the policy.
         "changed": {
@@ -153,8 +150,7 @@ def _describe_world(
         "slots": scenario.slot_offsets,
         "obstacles": np.stack([arrays[f"obstacle_{name}"][0] for name in ("x", "y", "radius")], axis=-1).tolist(),
         "tasks": TASKS,
-        "weights": weights,
-        "terms": [_meaning(term) for term in REWARD_TERMS if term.name in weights],
+        "terms": [_meaning(term) for term in REWARD_TERMS if dict(scenario.reward_weights).get(term.name)],
         "fields": [_field(field) for field in fields],
         "metrics": [_meaning(metric) for metric in posse.METRICS],
     }
@@ -177,4 +173,4 @@ def _field(field: Field) -> dict[str, Any]:
     else:
         block = "own motion" if field.name in _OWN else "task"
     unknown = None if field.unknown is None else float(field.unknown)
-    return {**_meaning(field), "size": field.size, "unknown": unknown, "block": block}
+    return {**_meaning(field), "unknown": unknown, "block": block}

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse_baselines import Policy, Trajectory, load, rollout
+from posse_baselines import Policy, Trajectory, batch_for, load, rollout
 from posse_baselines.playing import poses_of
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -27,8 +27,8 @@ _FRAME: Final = ("world_frame_cos", "world_frame_sin")
 _RECORD: Final = ("tracker_pose", "target_pose", "tracker_speed", "tracker_broken_at", "annotations", *_FRAME)
 
 
-def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> tuple[Floats, Floats]:
-    """Return starts as in figure 7, tracker poses (E, N, 3) and target poses (E, 3).
+def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> dict[str, Floats]:
+    """Return starts as in figure 7, options of a reset: ``tracker_pose`` (E, N, 3) and ``target_pose`` (E, 3).
 
     The target is the leftmost robot and heads towards -x: of the scenario's worlds, in order, those
     with all trackers behind the target are selected.
@@ -45,7 +45,7 @@ def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> tuple[Float
             break
     drawn = np.concatenate(targets)[:starts]
     drawn[:, 2] = TARGET_HEADING
-    return np.concatenate(trackers)[:starts], drawn
+    return {"tracker_pose": np.concatenate(trackers)[:starts], "target_pose": drawn}
 
 
 def run_of(
@@ -53,8 +53,7 @@ def run_of(
 ) -> Trajectory:
     """Play a whole episode in ``worlds`` worlds of :data:`SPLIT`."""
     team = load(policy) if isinstance(policy, str) else policy
-    scenario = scenario.replace(message_size=team.message_size)
-    batch = posse.Batch(scenario, worlds, seed=seed, split=SPLIT, autoreset="disabled")
+    batch = batch_for(team, scenario, worlds, seed=seed, split=SPLIT, autoreset="disabled")
     return rollout(batch, team, _RECORD, options=options)
 
 
@@ -107,10 +106,13 @@ def settling_times(run: Trajectory) -> Floats:
     place, speeds, time = relative(run), run["tracker_speed"].astype(np.float64), times(run)
     moved = np.linalg.norm(place - place[-1], axis=-1) > TOLERANCE
     changed = np.abs(speeds - speeds[-1]) > SPEED_TOLERANCE
-    unsettled = (moved | changed).any(axis=-1)  # (T + 1, E)
-    last = np.where(unsettled.any(axis=0), run.steps - unsettled[::-1].argmax(axis=0), -1)
-    settled = time[np.minimum(last + 1, run.steps)]
+    settled = time[np.minimum(first_without((moved | changed).any(axis=-1)), run.steps)]
     return np.where(settled > time[-1] - 1.0, np.nan, settled)
+
+
+def first_without(condition: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Return the first frame of each world from which on a condition, (T + 1, E), holds no more; T + 1: none."""
+    return np.where(condition.any(axis=0), len(condition) - condition[::-1].argmax(axis=0), 0)
 
 
 def median_world(times: Floats) -> int:

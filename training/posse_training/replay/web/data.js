@@ -1,7 +1,8 @@
-// Reads the page's data: a JSON header and one deflated stream of whole numbers.
+// Reads the page's data: one deflated stream of a JSON header, a newline, and whole numbers.
 // posse_training/replay/format.py says how they are written.
 
 const SMOOTHED = 1; // s, over which the present score is averaged
+const MISSING = -(2 ** 30);
 
 // A quantity over time: frames rows of `size` numbers each.
 class Column {
@@ -13,7 +14,7 @@ class Column {
   // The k-th number of a frame.
   at(frame, k = 0) {
     const whole = this.series[k * this.frames + frame];
-    return whole === this.missing ? NaN : whole * this.scale;
+    return whole === MISSING ? NaN : whole * this.scale;
   }
 
   // Between two frames, for drawing; after the last one, its value.
@@ -25,16 +26,13 @@ class Column {
   }
 }
 
-function unpack({ shape, width, order }, frames, bytes) {
-  const size = shape.reduce((product, n) => product * n, 1);
-  const count = size * frames;
-  const series = new Int32Array(count);
-  for (let plane = 0; plane < width; plane++) {
-    for (let i = 0; i < count; i++) series[i] |= bytes[plane * count + i] << (8 * plane);
-  }
-  for (let i = 0; i < count; i++) series[i] = (series[i] >>> 1) ^ -(series[i] & 1);
-  for (let pass = 0; pass < order; pass++) {
-    for (let i = 0; i < count; i++) if (i % frames) series[i] += series[i - 1];
+// The series of all columns of a player, one after the other.
+function unpack(bytes, frames) {
+  const series = new Int32Array(bytes.length / 4);
+  for (let i = 0; i < series.length; i++) {
+    for (let plane = 0; plane < 4; plane++) series[i] |= bytes[plane * series.length + i] << (8 * plane);
+    series[i] = (series[i] >>> 1) ^ -(series[i] & 1);
+    if (i % frames) series[i] += series[i - 1];
   }
   return series;
 }
@@ -42,10 +40,6 @@ function unpack({ shape, width, order }, frames, bytes) {
 // JSON knows no infinite numbers: they come as {"number": "inf"}.
 function revive(key, value) {
   return { inf: Infinity, "-inf": -Infinity, nan: NaN }[value?.number] ?? value;
-}
-
-export function readJson(id) {
-  return JSON.parse(document.getElementById(id).textContent, revive);
 }
 
 // Of each frame: the score of the step, averaged over the last second (the score jumps from step
@@ -66,21 +60,22 @@ function scoresOf(player, step) {
 }
 
 export async function readReplay() {
-  const { world, players } = readJson("header");
   const text = atob(document.getElementById("data").textContent);
   const packed = Uint8Array.from(text, (character) => character.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  let start = 0;
+  let start = bytes.indexOf(10); // the newline
+  const { world, players } = JSON.parse(new TextDecoder().decode(bytes.subarray(0, start++)), revive);
   players.forEach((player, number) => {
-    const columns = new Map();
-    for (const described of player.columns) {
-      const column = new Column(described, player.frames, unpack(described, player.frames, bytes.subarray(start)));
-      start += column.series.length * described.width;
-      columns.set(described.name, column);
-    }
-    const events = player.events.map(([step, kind, text, robots]) => ({ step, kind, text, robots }));
-    Object.assign(player, { number, columns, events, last: player.frames - 1 });
+    const { frames } = player;
+    const sizes = player.columns.map(({ shape }) => shape.reduce((product, n) => product * n, frames));
+    const end = start + 4 * sizes.reduce((sum, size) => sum + size, 0);
+    const series = unpack(bytes.subarray(start, end), frames);
+    start = end;
+    let place = 0;
+    const columns = new Map(player.columns.map((described, k) =>
+      [described.name, new Column(described, frames, series.subarray(place, (place += sizes[k])))]));
+    Object.assign(player, { number, columns, last: frames - 1 });
     player.scores = scoresOf(player, world.settings.control_step);
   });
   return { world, players, last: Math.max(...players.map((player) => player.last)) };

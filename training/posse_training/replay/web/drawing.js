@@ -1,7 +1,7 @@
 // Colours, strokes and marks that pictures, timeline and legend share.
-import { readJson } from "./data.js";
 
-export const colours = readJson("colours"); // those of figures and films, and what differs in the dark
+// Those of figures and films, and what differs in the dark.
+export const colours = JSON.parse(document.getElementById("colours").textContent);
 if (matchMedia("(prefers-color-scheme: dark)").matches) Object.assign(colours, colours.DARK);
 for (const [name, value] of Object.entries(colours)) {
   if (typeof value === "string") {

@@ -91,7 +91,7 @@ function actions(robot) {
 }
 
 function rewards(robot) {
-  const { weights, terms } = app.world;
+  const { terms, settings: { reward_weights: weights } } = app.world;
   const term = (player, name, frame) => player.columns.get(`reward/${name}`)?.at(frame, robot) ?? 0;
   const rows = terms.map(({ name, unit, meaning }) =>
     row(`${words(name)} × ${setting(weights[name])}`, unit, (player, frame) =>
@@ -133,10 +133,11 @@ function fieldRow(field, robot, place = 0) {
   return row(words(field.name.replace(/^neighbour_/, "")), field.unit, (player, frame) => {
     const column = player.columns.get(`observation/${field.name}`);
     if (!column) return null;
-    const start = (robot * column.size) / column.shape[0] + place * field.size;
-    const found = values(column, frame, start, field.size);
+    const places = field.block === "team-mates" ? column.shape[1] : 1;
+    const size = column.size / (column.shape[0] * places); // a message's is each policy's own
+    const found = values(column, frame, (robot * places + place) * size, size);
     if (!isKnown(player, field, frame, robot, place, found)) return null;
-    const digits = column.scale === 1 ? 0 : field.size > 3 ? 1 : 2;
+    const digits = column.scale === 1 ? 0 : size > 3 ? 1 : 2;
     return found.map((value) => number(value, digits)).join("  ");
   }, { title: field.meaning, none: "not known" });
 }

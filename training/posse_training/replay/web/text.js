@@ -39,7 +39,7 @@ export function words(name) {
 }
 
 export function fillHeader() {
-  const { scenario, version, world, seed, split, episode, changed, posse, commit } = app.world;
+  const { settings, world, seed, split, episode, changed, posse, commit } = app.world;
   const fact = (name, value, title = "", className = "") => {
     const made = element("span", [element("i", `${name} `), element("b", String(value))], className);
     made.title = title;
@@ -51,6 +51,6 @@ export function fillHeader() {
     facts.push(fact(words(name), `${setting(there)} → ${setting(here)}`, "changed setting", "changed"));
   }
   facts.push(fact("posse", commit ? `${posse} (${commit})` : posse, "version, commit"));
-  document.getElementById("scenario").replaceChildren(scenario, element("small", ` v${version}`));
+  document.getElementById("scenario").replaceChildren(settings.name, element("small", ` v${settings.version}`));
   document.getElementById("facts").replaceChildren(...facts);
 }
