@@ -19,21 +19,19 @@ from gymnasium.error import ResetNeeded
 from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
-    SCRATCH,
     START,
     START_FROM_POSES,
     STEP,
-    Fixed,
     Results,
     direct,
     draw_anew,
     first_bad_start,
+    fixed_for,
     kernel_of,
-    tables_of,
 )
 from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
 from posse.rules.start import check_drawn
-from posse.rules.state import NEVER, SPLITS, WorldArrays, new_scratch
+from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.generate import declarations_for
 from posse.signals.layout import ObservationLayout
@@ -176,8 +174,7 @@ class Batch:
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        tables = tables_of(self.scenario, self._declared.reward_terms)
-        self._fixed = Fixed(tables, self.arrays, new_scratch(SCRATCH, threads))
+        self._fixed = fixed_for(self.scenario, self._declared.reward_terms, self.arrays, threads)
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
@@ -298,7 +295,7 @@ class Batch:
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
                 theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
-        draw_anew(self._fixed.tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        draw_anew(self._fixed.config, into.worlds, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
 
@@ -377,7 +374,7 @@ class Batch:
             x, y, heading = np.moveaxis(pose[chosen], -1, 0)
             records["x"][chosen], records["y"][chosen] = x, y
             records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
-        config, n = self._fixed.tables.config, self.scenario.num_trackers
+        config, n = self._fixed.config, self.scenario.num_trackers
         e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
         if e < 0:
             return

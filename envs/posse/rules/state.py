@@ -463,8 +463,12 @@ def scratch_record(*fields: tuple[str, int]) -> np.dtype[Any]:
     return np.dtype((np.record, [(name, np.float32, (length,)) for name, length in (*fields, ("padding", padding))]))
 
 
-def new_scratch(record: np.dtype[Any], threads: int) -> Records:
-    """Return zeroed scratch memory for one scenario, a record for each thread."""
+def new_scratch(record: np.dtype[Any], scenario: Scenario, threads: int) -> Records:
+    """Return scratch memory, a record for each thread, with what is the same in all worlds of a scenario."""
     memory = np.zeros(threads * record.itemsize + 4 * _LINE, np.uint8)
     start = -memory.ctypes.data % (4 * _LINE)
-    return memory[start : start + threads * record.itemsize].view(record)
+    scratch = memory[start : start + threads * record.itemsize].view(record)
+    scratch["index"], scratch["radius"] = np.arange(ROBOTS), scenario.robot_radius
+    for name, values in zip(("beam_cos", "beam_sin"), beam_directions(scenario), strict=True):
+        scratch[name][:, : scenario.sonar_beams] = values
+    return scratch
