@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import reprlib
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -39,11 +38,9 @@ from posse.signals.reward import check_terms
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
-_RECYCLED_FROM: Final = 1 << 14
-"""Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_returned", "_infos"))
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_infos"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -175,7 +172,6 @@ class Batch:
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
         self._fixed = fixed_for(self.scenario, self._declared.reward_terms, self.arrays, threads)
-        self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
         self._infos = Infos(self.scenario, zeros)
@@ -474,14 +470,15 @@ class Batch:
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""
-        worlds, rows, size = whole = self.observation_shape
-        each, terms = (worlds, rows), (worlds, rows, len(self.term_names))
-        if worlds * rows * size < _RECYCLED_FROM:
-            arrays = np.empty(whole, _FLOAT32), np.empty(each, _FLOAT32), np.empty(terms, _FLOAT32)
-        else:
-            returned = self._returned
-            arrays = _reused(returned[0], whole), _reused(returned[1], each), _reused(returned[2], terms)
-        return Results(*arrays, np.empty(worlds, _FLOAT32), np.empty(worlds, np.bool_), np.empty(worlds, np.bool_))
+        worlds, rows, _ = self.observation_shape
+        return Results(
+            np.empty(self.observation_shape, _FLOAT32),
+            np.empty((worlds, rows), _FLOAT32),
+            np.empty((worlds, rows, len(self.term_names)), _FLOAT32),
+            np.empty(worlds, _FLOAT32),
+            np.empty(worlds, np.bool_),
+            np.empty(worlds, np.bool_),
+        )
 
     def check_started(self, what: str) -> None:
         """Raise ResetNeeded before the first :meth:`reset`."""
@@ -498,18 +495,3 @@ class Batch:
                 f"step after the end of the episode of world {over[0]}{more}: call reset() first, "
                 'or reset(options={"reset_mask": mask}) for these worlds alone'
             )
-
-
-def _reused(returned: list[FloatArray], shape: tuple[int, ...]) -> FloatArray:
-    """Return an array of a shape to which there is no other reference, one returned before or a new one.
-
-    A view or a tensor refers to the array that owns its memory, so what a caller keeps is never overwritten.
-    Allocating large arrays in every step would take as long as the step, since the system maps memory page by page.
-    """
-    for k in range(len(returned)):
-        if sys.getrefcount(returned[k]) == 2:  # of the list, and of the call's argument
-            return returned[k]
-    array = np.empty(shape, np.float32)
-    if len(returned) < 4:
-        returned.append(array)
-    return array
