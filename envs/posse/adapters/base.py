@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
-from posse.engine.batch import Batch, Infos
+from posse.engine.batch import Batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray, OwnArrays
 from posse.rendering import RENDER_MODES
@@ -148,7 +148,8 @@ class WorldEnv(OwnArrays, BatchEnv):
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
-        self._infos = Infos(self.scenario, 0.0)
+        self._no_info: dict[str, Any] = dict.fromkeys(self.batch._info, 0.0)
+        self._rewards = self.batch._rewards
         self._breakable = self.scenario.breaks > 0
         self.state_layout = StateLayout(self.scenario)
         self._allocate()
@@ -194,6 +195,10 @@ class WorldEnv(OwnArrays, BatchEnv):
         if self.render_mode is not None:
             self._show()
 
-    def _metrics(self) -> dict[str, float]:
-        """Return every metric of the episode."""
-        return {name: float(v[0]) for name, v in self.batch.metrics().items()}
+    def _info(self) -> dict[str, Any]:
+        """Return the info of the last step or reset, without reward terms."""
+        info = self._no_info.copy()
+        info["score"] = self._own.scores.item()
+        if self.batch._over:
+            info.update((f"metrics/{name}", float(values[0])) for name, values in self.batch.metrics().items())
+        return info

@@ -40,7 +40,7 @@ AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_infos"))
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_info"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -51,51 +51,6 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
-
-
-class Infos:
-    """Builds the infos of a scenario.
-
-    ===================== ==========================================================================
-    ``score``             of the team in this step, [0, 1]
-    ``reward/<term>``     each reward term, unscaled (``posse.REWARD_TERMS``)
-    ``metrics/<metric>``  each metric of the episode (``posse.METRICS``); 0 before the step that ends it
-    ``working``           whether a tracker works; only in scenarios where trackers break
-    ===================== ==========================================================================
-
-    Args:
-        scenario: Names the terms and metrics.
-        zero: A metric before the end of the episode.
-    """
-
-    def __init__(self, scenario: Scenario, zero: Any) -> None:
-        declared = declarations_for(scenario)
-        rewards = [f"reward/{name}" for name in declared.term_names]
-        self._rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
-        names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
-        self._template = dict.fromkeys(names, zero)
-
-    def build(self, score: Any, metrics: Mapping[str, Any] | None, terms: Any = None) -> dict[str, Any]:
-        """Return an info; ``metrics`` by name where the episode ends, ``terms`` (K, ...) in the order of the names."""
-        info = self._template.copy()
-        info["score"] = score
-        if metrics is not None:
-            info.update((f"metrics/{name}", value) for name, value in metrics.items())
-        if terms is not None:
-            for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
-                info[key] = terms[k]
-        return info
-
-    def by_agent(
-        self, agents: list[str], score: float, metrics: Mapping[str, float] | None, terms: list[list[float]]
-    ) -> dict[str, dict[str, Any]]:
-        """Return the infos of agents by name, which differ in their own terms (rows, K)."""
-        common, rewards, infos = self.build(score, metrics), self._rewards, {}
-        for agent, own in zip(agents, terms):  # noqa: B905  equal lengths, in the hot path
-            infos[agent] = info = common.copy()
-            for key, k in rewards:
-                info[key] = own[k]
-        return infos
 
 
 class Batch:
@@ -151,6 +106,7 @@ class Batch:
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
         self.term_names = declarations_for(scenario).term_names
+        self._rewards = tuple((f"reward/{name}", k) for k, name in enumerate(self.term_names))
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
         try:
@@ -174,7 +130,8 @@ class Batch:
         self._fixed = fixed_for(self.scenario, self._declared.reward_terms, self.arrays, threads)
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
-        self._infos = Infos(self.scenario, zeros)
+        metrics = (f"metrics/{metric.name}" for metric in self._declared.metrics)
+        self._info = dict.fromkeys(("score", *(key for key, _ in self._rewards), *metrics), zeros)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
@@ -406,10 +363,12 @@ class Batch:
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            Infos have the keys of :class:`posse.engine.batch.Infos` at every step: ``"score"`` (E,);
-            ``"reward/<term>"`` (E, rows); ``"metrics/<metric>"`` (E,), 0 where the episode goes on;
-            ``"working"`` (E, N). With autoreset ``"same_step"`` also ``"final_obs"`` (E, rows, F),
-            the observations before new episodes start. Arrays are never overwritten later.
+            Infos have the same keys at every step: ``"score"`` (E,) of the team in this step, [0, 1];
+            ``"reward/<term>"`` (E, rows), each reward term, unscaled (``posse.REWARD_TERMS``);
+            ``"metrics/<metric>"`` (E,), each metric of the episode (``posse.METRICS``), 0 where it goes on;
+            ``"working"`` (E, N), only in scenarios where trackers break. With autoreset ``"same_step"``
+            also ``"final_obs"`` (E, rows, F), the observations before new episodes start. Arrays are
+            never overwritten later.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
@@ -422,11 +381,11 @@ class Batch:
         begun = self._over > 0 and self.autoreset == "next_step"
         over = self._advance(actions, results) > 0
         observations, rewards, terms, scores, terminated, truncated = results
-        metrics = None
+        infos = self._infos_of(scores, terms)
         if over:
             ended = terminated | truncated
-            metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos_of(scores, terms, metrics)
+            for name, values in self.metrics().items():
+                infos[f"metrics/{name}"] = np.where(ended, values, 0.0)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
@@ -440,11 +399,12 @@ class Batch:
                 raise
         return observations, rewards, terminated, truncated, infos
 
-    def _infos_of(
-        self, scores: npt.NDArray[Any], terms: FloatArray, metrics: Mapping[str, npt.NDArray[Any]] | None = None
-    ) -> dict[str, Any]:
-        """Return the infos of scores (E,) and terms (E, rows, K), with ``metrics`` where an episode ends."""
-        infos = self._infos.build(scores, metrics, terms.transpose(2, 0, 1))
+    def _infos_of(self, scores: npt.NDArray[Any], terms: FloatArray) -> dict[str, Any]:
+        """Return the infos of scores (E,) and terms (E, rows, K) while episodes go on."""
+        infos: dict[str, Any] = self._info.copy()
+        infos["score"] = scores
+        for key, k in self._rewards:
+            infos[key] = terms[:, :, k]
         if self.scenario.breaks > 0:
             infos["working"] = self.working
         return infos
