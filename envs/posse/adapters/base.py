@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +15,10 @@ from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.batch import Batch
 from posse.engine.opponent import TargetPolicy, batch
-from posse.numeric import FloatArray, OwnArrays
+from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
-
-_ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
 class BatchEnv:
@@ -143,7 +141,7 @@ class BatchEnv:
             self._renderer = None
 
 
-class WorldEnv(OwnArrays, BatchEnv):
+class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
@@ -163,11 +161,8 @@ class WorldEnv(OwnArrays, BatchEnv):
             terms=self._results.terms[0, rows].T,  # (K, ...)
         )
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in super().__getstate__().items() if name not in _ALLOCATED}
-
     def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
+        self.__dict__.update(state)
         self._allocate()
 
     def state(self) -> FloatArray:

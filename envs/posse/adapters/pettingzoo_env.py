@@ -127,6 +127,9 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
                 infos[agent]["working"] = works  # a target never breaks
         return infos
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "_action_of": None}  # memoryviews cannot be pickled
+
     def _allocate(self) -> None:
         super()._allocate()
         self._actions = np.zeros(self.batch.action_shape, np.float32)
