@@ -402,9 +402,9 @@ class Batch:
     def _infos_of(self, scores: npt.NDArray[Any], terms: FloatArray) -> dict[str, Any]:
         """Return the infos of scores (E,) and terms (E, rows, K) while episodes go on."""
         infos: dict[str, Any] = self._info.copy()
-        infos["score"] = scores
+        infos["score"], by_term = scores, terms.transpose(2, 0, 1)
         for key, k in self._rewards:
-            infos[key] = terms[:, :, k]
+            infos[key] = by_term[k]
         if self.scenario.breaks > 0:
             infos["working"] = self.working
         return infos
