@@ -28,7 +28,7 @@ from posse.engine.kernels import (
     fixed_for,
     kernel_of,
 )
-from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds, threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
@@ -46,14 +46,14 @@ Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class Snapshot(OwnArrays):
     """A saved state of a batch: :meth:`Batch.save`, :meth:`Batch.restore`."""
 
     scenario: Scenario
     arrays: WorldArrays
 
 
-class Batch:
+class Batch(OwnArrays):
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
@@ -137,7 +137,7 @@ class Batch:
         return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self._prepare()
 
     # The state of the worlds.

@@ -376,10 +376,6 @@ class WorldArrays(NamedTuple):
         for mine, theirs in zip(self, other, strict=True):
             mine[...] = theirs
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        # Arrays unpickled out of band would be read-only and possibly unaligned.
-        return _copied, tuple(self)
-
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
         return {
@@ -392,10 +388,6 @@ def _parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArra
         yield name, array.view()
     for part in array.dtype.names or ():
         yield from _parts(f"{name}_{part}", array[part])
-
-
-def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
-    return WorldArrays(*arrays).copy()
 
 
 def slot_records(scenario: Scenario) -> Records:
