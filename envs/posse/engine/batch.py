@@ -213,7 +213,7 @@ class Batch(OwnArrays):
             ResetNeeded: Before the first :meth:`reset`.
         """
         self.check_started("observe")
-        return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
+        return self._execute(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
         """Return ``count`` copies of the current state of every world, for planning ahead.
@@ -293,11 +293,11 @@ class Batch(OwnArrays):
         else:
             world["episode"][chosen] += 1
         try:
-            observations = self._start(chosen, START)
+            observations = self._execute(chosen, START)
             check_drawn(self.scenario, world, chosen, poses)
             if poses:
                 self._place(poses, chosen)
-                observations = self._start(chosen, START_FROM_POSES)
+                observations = self._execute(chosen, START_FROM_POSES)
         except BaseException:
             self.arrays.write(before)
             self._over = over
@@ -341,7 +341,7 @@ class Batch(OwnArrays):
             "left or right turning circle must be clear of obstacles and walls: move it or turn it"
         )
 
-    def _start(self, chosen: BoolArray, order: int) -> FloatArray:
+    def _execute(self, chosen: BoolArray, order: int) -> FloatArray:
         """Execute an order in the chosen worlds; return every world's observations."""
         results = self._new_results()
         actions = np.zeros(self.action_shape, np.float32)  # not read
@@ -390,7 +390,7 @@ class Batch(OwnArrays):
             infos["final_obs"] = observations
             if over:
                 self.arrays.world["episode"][ended] += 1
-                observations, begun = self._start(ended, START), True
+                observations, begun = self._execute(ended, START), True
         if begun:
             try:
                 check_drawn(self.scenario, self.arrays.world, self.arrays.world["step"] == 0)
