@@ -75,11 +75,17 @@ def test_results_do_not_depend_on_how_worlds_are_cut(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_a_vector_environment_holds_worlds_of_all(autoreset: str) -> None:
-    env = gym.make_vec("posse/Solo-v0", num_envs=20, scenario=OPEN, autoreset=autoreset)
+    env: Any = gym.make_vec("posse/Solo-v0", num_envs=20, scenario=OPEN, autoreset=autoreset)
     observations, infos = env.reset(seed=1)
     assert observations in env.observation_space
     assert infos["score"].shape == (20,)
     env.action_space.seed(0)
+    before, wrong = [part.batch.arrays.copy() for part in env.parts], np.zeros((20, 2))
+    wrong[-1] = 2
+    with pytest.raises(ValueError, match="not a number in"):
+        env.step(wrong)
+    for part, arrays in zip(env.parts, before, strict=True):
+        assert all(np.array_equal(*both) for both in zip(part.batch.arrays, arrays, strict=True))
     for _ in range(OPEN.horizon):
         observations, rewards, _, truncated, infos = env.step(env.action_space.sample())
         assert rewards.shape == (20,)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,14 +13,12 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
-from posse.engine.batch import Batch, Infos
+from posse.engine.batch import Batch
 from posse.engine.opponent import TargetPolicy, batch
-from posse.numeric import FloatArray, OwnArrays
+from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
-
-_ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
 class BatchEnv:
@@ -143,12 +141,13 @@ class BatchEnv:
             self._renderer = None
 
 
-class WorldEnv(OwnArrays, BatchEnv):
+class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
-        self._infos = Infos(self.scenario, 0.0)
+        self._no_info: dict[str, Any] = dict.fromkeys(self.batch._info, 0.0)
+        self._rewards = self.batch._rewards
         self._breakable = self.scenario.breaks > 0
         self.state_layout = StateLayout(self.scenario)
         self._allocate()
@@ -162,11 +161,8 @@ class WorldEnv(OwnArrays, BatchEnv):
             terms=self._results.terms[0, rows].T,  # (K, ...)
         )
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in super().__getstate__().items() if name not in _ALLOCATED}
-
     def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
+        self.__dict__.update(state)
         self._allocate()
 
     def state(self) -> FloatArray:
@@ -194,6 +190,10 @@ class WorldEnv(OwnArrays, BatchEnv):
         if self.render_mode is not None:
             self._show()
 
-    def _metrics(self) -> dict[str, float]:
-        """Return every metric of the episode."""
-        return {name: float(v[0]) for name, v in self.batch.metrics().items()}
+    def _info(self) -> dict[str, Any]:
+        """Return the info of the last step or reset, without reward terms."""
+        info = self._no_info.copy()
+        info["score"] = self._own.scores.item()
+        if self.batch._over:
+            info.update((f"metrics/{name}", float(values[0])) for name, values in self.batch.metrics().items())
+        return info

@@ -106,10 +106,10 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
     def _info(self) -> dict[str, Any]:
-        """Return the info of the last step or reset."""
-        own = self._own
-        terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
-        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
+        info, terms = super()._info(), self._own.terms
+        values = terms.copy() if terms.ndim == 2 else terms.tolist()
+        for key, k in self._rewards:
+            info[key] = values[k]
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)

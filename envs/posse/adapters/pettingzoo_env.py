@@ -117,13 +117,18 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def _infos_of(self, agents: list[str]) -> _AgentInfos:
         """Return the infos of the last step or reset."""
-        own = self._own
-        metrics = self._metrics() if self.batch._over else None
-        infos = self._infos.by_agent(agents, own.scores.item(), metrics, own.terms.T.tolist())
+        common, rewards, infos = self._info(), self._rewards, {}
+        for agent, own in zip(agents, self._own.terms.T.tolist()):  # noqa: B905  equal lengths, in the hot path
+            infos[agent] = info = common.copy()
+            for key, k in rewards:  # faster than dict.update(zip(...)), which creates tuples
+                info[key] = own[k]
         if self._breakable:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks
         return infos
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "_action_of": None}  # memoryviews cannot be pickled
 
     def _allocate(self) -> None:
         super()._allocate()

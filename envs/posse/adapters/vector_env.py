@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import as_motions
 from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
-from posse.engine.arguments import options_of, real_numbers
+from posse.engine.arguments import in_box, options_of, real_numbers
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, ScenarioError
 from posse.scenarios.family import scenario_or_family, shares
@@ -86,8 +86,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ResetNeeded: Before the first reset, or after an end with autoreset ``"disabled"``.
             ValueError: Actions out of their space; nothing is changed.
         """
-        motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
-        observations, rewards, terminated, truncated, found = self.batch.step(motions.reshape(self.batch.action_shape))
+        observations, rewards, terminated, truncated, found = self.batch.step(self._read(actions))
         self._show()
         ended, last = terminated | truncated, found.pop("final_obs", None)
         infos, more = self._own(found), {}
@@ -103,6 +102,11 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | more
         own = rewards.mean(axis=1, dtype=np.float64)
         return observations[:, self._rows], own, terminated, truncated, infos
+
+    def _read(self, actions: Any) -> FloatArray:
+        """Return actions as the batch takes them, whose range is not checked."""
+        motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
+        return motions.reshape(self.batch.action_shape)
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of a batch's infos, in the types of Gymnasium's own vector environments."""
@@ -177,8 +181,11 @@ class FamilyVectorEnv(VectorEnv[Any, Any, Any]):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Advance every world by one control step."""
-        whole = real_numbers("the array of actions", actions, self.action_space.shape)
-        found = [part.step(actions) for part, actions in zip(self.parts, self._split(whole), strict=True)]
+        split = self._split(real_numbers("the array of actions", actions, self.action_space.shape))
+        for part, share in zip(self.parts, split, strict=True):  # before any world advances
+            part.batch.check_running()
+            in_box(part._read(share), part.batch.clip_actions)
+        found = [part.step(share) for part, share in zip(self.parts, split, strict=True)]
         *arrays, infos = zip(*found, strict=True)
         observations, rewards, terminated, truncated = map(np.concatenate, arrays)
         return observations, rewards, terminated, truncated, _joined(infos, self._sizes)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import reprlib
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -19,21 +18,19 @@ from gymnasium.error import ResetNeeded
 from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
-    SCRATCH,
     START,
     START_FROM_POSES,
     STEP,
-    Fixed,
     Results,
     direct,
     draw_anew,
     first_bad_start,
+    fixed_for,
     kernel_of,
-    tables_of,
 )
-from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds, threads_for
 from posse.rules.start import check_drawn
-from posse.rules.state import NEVER, SPLITS, WorldArrays, new_scratch
+from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.generate import declarations_for
 from posse.signals.layout import ObservationLayout
@@ -41,69 +38,22 @@ from posse.signals.reward import check_terms
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
-_RECYCLED_FROM: Final = 1 << 14
-"""Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_returned", "_infos"))
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_info"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class Snapshot(OwnArrays):
     """A saved state of a batch: :meth:`Batch.save`, :meth:`Batch.restore`."""
 
     scenario: Scenario
     arrays: WorldArrays
 
 
-class Infos:
-    """Builds the infos of a scenario.
-
-    ===================== ==========================================================================
-    ``score``             of the team in this step, [0, 1]
-    ``reward/<term>``     each reward term, unscaled (``posse.REWARD_TERMS``)
-    ``metrics/<metric>``  each metric of the episode (``posse.METRICS``); 0 before the step that ends it
-    ``working``           whether a tracker works; only in scenarios where trackers break
-    ===================== ==========================================================================
-
-    Args:
-        scenario: Names the terms and metrics.
-        zero: A metric before the end of the episode.
-    """
-
-    def __init__(self, scenario: Scenario, zero: Any) -> None:
-        declared = declarations_for(scenario)
-        rewards = [f"reward/{name}" for name in declared.term_names]
-        self._rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
-        names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
-        self._template = dict.fromkeys(names, zero)
-
-    def build(self, score: Any, metrics: Mapping[str, Any] | None, terms: Any = None) -> dict[str, Any]:
-        """Return an info; ``metrics`` by name where the episode ends, ``terms`` (K, ...) in the order of the names."""
-        info = self._template.copy()
-        info["score"] = score
-        if metrics is not None:
-            info.update((f"metrics/{name}", value) for name, value in metrics.items())
-        if terms is not None:
-            for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
-                info[key] = terms[k]
-        return info
-
-    def by_agent(
-        self, agents: list[str], score: float, metrics: Mapping[str, float] | None, terms: list[list[float]]
-    ) -> dict[str, dict[str, Any]]:
-        """Return the infos of agents by name, which differ in their own terms (rows, K)."""
-        common, rewards, infos = self.build(score, metrics), self._rewards, {}
-        for agent, own in zip(agents, terms):  # noqa: B905  equal lengths, in the hot path
-            infos[agent] = info = common.copy()
-            for key, k in rewards:
-                info[key] = own[k]
-        return infos
-
-
-class Batch:
+class Batch(OwnArrays):
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
@@ -156,6 +106,7 @@ class Batch:
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
         self.term_names = declarations_for(scenario).term_names
+        self._rewards = tuple((f"reward/{name}", k) for k, name in enumerate(self.term_names))
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
         try:
@@ -176,18 +127,17 @@ class Batch:
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        tables = tables_of(self.scenario, self._declared.reward_terms)
-        self._fixed = Fixed(tables, self.arrays, new_scratch(SCRATCH, threads))
-        self._returned: tuple[list[FloatArray], ...] = ([], [], [])
+        self._fixed = fixed_for(self.scenario, self._declared.reward_terms, self.arrays, threads)
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
-        self._infos = Infos(self.scenario, zeros)
+        metrics = (f"metrics/{metric.name}" for metric in self._declared.metrics)
+        self._info = dict.fromkeys(("score", *(key for key, _ in self._rewards), *metrics), zeros)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self._prepare()
 
     # The state of the worlds.
@@ -263,7 +213,7 @@ class Batch:
             ResetNeeded: Before the first :meth:`reset`.
         """
         self.check_started("observe")
-        return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
+        return self._execute(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
         """Return ``count`` copies of the current state of every world, for planning ahead.
@@ -298,7 +248,7 @@ class Batch:
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
                 theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
-        draw_anew(self._fixed.tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        draw_anew(self._fixed.config, into.worlds, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
 
@@ -343,11 +293,11 @@ class Batch:
         else:
             world["episode"][chosen] += 1
         try:
-            observations = self._start(chosen, START)
+            observations = self._execute(chosen, START)
             check_drawn(self.scenario, world, chosen, poses)
             if poses:
                 self._place(poses, chosen)
-                observations = self._start(chosen, START_FROM_POSES)
+                observations = self._execute(chosen, START_FROM_POSES)
         except BaseException:
             self.arrays.write(before)
             self._over = over
@@ -377,7 +327,7 @@ class Batch:
             x, y, heading = np.moveaxis(pose[chosen], -1, 0)
             records["x"][chosen], records["y"][chosen] = x, y
             records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
-        config, n = self._fixed.tables.config, self.scenario.num_trackers
+        config, n = self._fixed.config, self.scenario.num_trackers
         e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
         if e < 0:
             return
@@ -391,7 +341,7 @@ class Batch:
             "left or right turning circle must be clear of obstacles and walls: move it or turn it"
         )
 
-    def _start(self, chosen: BoolArray, order: int) -> FloatArray:
+    def _execute(self, chosen: BoolArray, order: int) -> FloatArray:
         """Execute an order in the chosen worlds; return every world's observations."""
         results = self._new_results()
         actions = np.zeros(self.action_shape, np.float32)  # not read
@@ -413,10 +363,12 @@ class Batch:
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            Infos have the keys of :class:`posse.engine.batch.Infos` at every step: ``"score"`` (E,);
-            ``"reward/<term>"`` (E, rows); ``"metrics/<metric>"`` (E,), 0 where the episode goes on;
-            ``"working"`` (E, N). With autoreset ``"same_step"`` also ``"final_obs"`` (E, rows, F),
-            the observations before new episodes start. Arrays are never overwritten later.
+            Infos have the same keys at every step: ``"score"`` (E,) of the team in this step, [0, 1];
+            ``"reward/<term>"`` (E, rows), each reward term, unscaled (``posse.REWARD_TERMS``);
+            ``"metrics/<metric>"`` (E,), each metric of the episode (``posse.METRICS``), 0 where it goes on;
+            ``"working"`` (E, N), only in scenarios where trackers break. With autoreset ``"same_step"``
+            also ``"final_obs"`` (E, rows, F), the observations before new episodes start. Arrays are
+            never overwritten later.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
@@ -429,16 +381,16 @@ class Batch:
         begun = self._over > 0 and self.autoreset == "next_step"
         over = self._advance(actions, results) > 0
         observations, rewards, terms, scores, terminated, truncated = results
-        metrics = None
+        infos = self._infos_of(scores, terms)
         if over:
             ended = terminated | truncated
-            metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos_of(scores, terms, metrics)
+            for name, values in self.metrics().items():
+                infos[f"metrics/{name}"] = np.where(ended, values, 0.0)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
                 self.arrays.world["episode"][ended] += 1
-                observations, begun = self._start(ended, START), True
+                observations, begun = self._execute(ended, START), True
         if begun:
             try:
                 check_drawn(self.scenario, self.arrays.world, self.arrays.world["step"] == 0)
@@ -447,11 +399,12 @@ class Batch:
                 raise
         return observations, rewards, terminated, truncated, infos
 
-    def _infos_of(
-        self, scores: npt.NDArray[Any], terms: FloatArray, metrics: Mapping[str, npt.NDArray[Any]] | None = None
-    ) -> dict[str, Any]:
-        """Return the infos of scores (E,) and terms (E, rows, K), with ``metrics`` where an episode ends."""
-        infos = self._infos.build(scores, metrics, terms.transpose(2, 0, 1))
+    def _infos_of(self, scores: npt.NDArray[Any], terms: FloatArray) -> dict[str, Any]:
+        """Return the infos of scores (E,) and terms (E, rows, K) while episodes go on."""
+        infos: dict[str, Any] = self._info.copy()
+        infos["score"], by_term = scores, terms.transpose(2, 0, 1)
+        for key, k in self._rewards:
+            infos[key] = by_term[k]
         if self.scenario.breaks > 0:
             infos["working"] = self.working
         return infos
@@ -477,14 +430,15 @@ class Batch:
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""
-        worlds, rows, size = whole = self.observation_shape
-        each, terms = (worlds, rows), (worlds, rows, len(self.term_names))
-        if worlds * rows * size < _RECYCLED_FROM:
-            arrays = np.empty(whole, _FLOAT32), np.empty(each, _FLOAT32), np.empty(terms, _FLOAT32)
-        else:
-            returned = self._returned
-            arrays = _reused(returned[0], whole), _reused(returned[1], each), _reused(returned[2], terms)
-        return Results(*arrays, np.empty(worlds, _FLOAT32), np.empty(worlds, np.bool_), np.empty(worlds, np.bool_))
+        worlds, rows, _ = self.observation_shape
+        return Results(
+            np.empty(self.observation_shape, _FLOAT32),
+            np.empty((worlds, rows), _FLOAT32),
+            np.empty((worlds, rows, len(self.term_names)), _FLOAT32),
+            np.empty(worlds, _FLOAT32),
+            np.empty(worlds, np.bool_),
+            np.empty(worlds, np.bool_),
+        )
 
     def check_started(self, what: str) -> None:
         """Raise ResetNeeded before the first :meth:`reset`."""
@@ -501,18 +455,3 @@ class Batch:
                 f"step after the end of the episode of world {over[0]}{more}: call reset() first, "
                 'or reset(options={"reset_mask": mask}) for these worlds alone'
             )
-
-
-def _reused(returned: list[FloatArray], shape: tuple[int, ...]) -> FloatArray:
-    """Return an array of a shape to which there is no other reference, one returned before or a new one.
-
-    A view or a tensor refers to the array that owns its memory, so what a caller keeps is never overwritten.
-    Allocating large arrays in every step would take as long as the step, since the system maps memory page by page.
-    """
-    for k in range(len(returned)):
-        if sys.getrefcount(returned[k]) == 2:  # of the list, and of the call's argument
-            return returned[k]
-    array = np.empty(shape, np.float32)
-    if len(returned) < 4:
-        returned.append(array)
-    return array

@@ -32,7 +32,7 @@ from posse.numeric import (
     stamp,
 )
 from posse.rules.contact import meet
-from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
+from posse.rules.discs import find_gaps, lay_out, nonnegative
 from posse.rules.faults import apply_faults, draw_coming_faults
 from posse.rules.motion import drift, motion
 from posse.rules.randomness import mix
@@ -41,32 +41,33 @@ from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.senses.sonar import listen
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
-from posse.rules.state import RULES, WorldArrays, beam_directions, config_record, scratch_record, slot_records
+from posse.rules.state import RULES, WorldArrays, config_record, new_scratch, scratch_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
 from posse.signals.views import OBSERVING, Generated, observe_together
 
-SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
-"""Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
+SCRATCH: Final = scratch_record(*RULES, *OBSERVING)
+"""Scratch memory of a thread."""
 
 
 Orders = npt.NDArray[np.uint8]
 
 
-class Tables(NamedTuple):
-    """Constants common to the worlds of a batch."""
+class Fixed(NamedTuple):
+    """What a batch passes to its kernel every time."""
 
     config: Records
     """(1,) :data:`posse.rules.state.CONFIG`."""
     slots: Records
     """(N,) :data:`posse.rules.state.SLOT`."""
-    beams: FloatArray
-    """(2, S) cosine and sine of the sonar's beams."""
     weights: FloatArray
     """(K,) weight of each reward term."""
     target_weights: FloatArray
     """(K,) the same for a target that is an agent."""
+    worlds: WorldArrays
+    scratch: Records
+    """(threads,) :data:`SCRATCH`."""
 
 
 class Results(NamedTuple):
@@ -86,24 +87,13 @@ class Results(NamedTuple):
     """(E,)."""
 
 
-class Fixed(NamedTuple):
-    """What a batch passes to its kernel every time."""
+class Call(NamedTuple):
+    """What a batch passes to its kernel in one call."""
 
-    tables: Tables
-    worlds: WorldArrays
-    scratch: Records
-    """(threads,) :data:`SCRATCH`."""
-
-
-class Pass(NamedTuple):
-    """What a pass over the worlds reads and writes."""
-
-    tables: Tables
-    worlds: WorldArrays
     actions: FloatArray
-    """(E, rows, 2 + m); read by control steps only."""
+    """(E, rows, 2 + m); control steps alone read them."""
     orders: Orders
-    """(E,) what each world does, see :func:`advance_worlds`."""
+    """(E,) what each world does (:func:`advance_worlds`)."""
     results: Results
 
 
@@ -123,14 +113,14 @@ def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Reco
 
 @compiled
 def reward(
-    c: Record, w: Record, trackers: Records, tables: Tables, made: Generated, rewards: FloatArray, terms: FloatArray
+    c: Record, w: Record, trackers: Records, fixed: Fixed, made: Generated, rewards: FloatArray, terms: FloatArray
 ) -> None:
     """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
-        rewards[i] = made.reward(c, w, trackers[i], tables.weights, terms[i])
+        rewards[i] = made.reward(c, w, trackers[i], fixed.weights, terms[i])
     if c.target_agent != 0:
         n = c.num_trackers
-        rewards[n] = made.target_reward(c, w, tables.target_weights, terms[n])
+        rewards[n] = made.target_reward(c, w, fixed.target_weights, terms[n])
 
 
 @compiled
@@ -164,7 +154,7 @@ def fetch_all(array: npt.NDArray[Any]) -> None:
 
 
 @compiled
-def advance_worlds(first: int, count: int, through: Pass, made: Generated, scratch: Record) -> int:
+def advance_worlds(first: int, count: int, fixed: Fixed, call: Call, made: Generated, scratch: Record) -> int:
     """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
@@ -174,17 +164,16 @@ def advance_worlds(first: int, count: int, through: Pass, made: Generated, scrat
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH. The scratch memory must be initialised by
-    :func:`posse.rules.discs.lay_out_constants`.
+    ``count`` is at most WIDTH.
     """
-    tables, worlds, actions, results = through.tables, through.worlds, through.actions, through.results
-    c, over = tables.config[0], 0
+    actions, orders, results = call
+    worlds, c, over = fixed.worlds, fixed.config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
             fetch_all(observations)  # written below, after the loop; without it 16,384 worlds take a third longer
-        order = through.orders[e]
+        order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
@@ -205,10 +194,10 @@ def advance_worlds(first: int, count: int, through: Pass, made: Generated, scrat
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
             sense(c, worlds, e, made, scratch)
-            occupy(c, w, trackers, tables.slots, scratch)
+            occupy(c, w, trackers, fixed.slots, scratch)
         if order == STEP:
-            end_step(c, w, trackers, tables.slots, made)
-            reward(c, w, trackers, tables, made, rewards, terms)
+            end_step(c, w, trackers, fixed.slots, made)
+            reward(c, w, trackers, fixed, made, rewards, terms)
         else:
             if order != LOOK:
                 w.held, w.score = 0, ZERO
@@ -223,11 +212,12 @@ def advance_worlds(first: int, count: int, through: Pass, made: Generated, scrat
     return over
 
 
-def tables_of(scenario: Scenario, terms: Iterable[RewardTerm]) -> Tables:
-    """Return the tables of a scenario with these reward terms; those that it does not weight count 0."""
+def fixed_for(scenario: Scenario, terms: Iterable[RewardTerm], worlds: WorldArrays, threads: int) -> Fixed:
+    """Return the arguments of a scenario with these reward terms; those that it does not weight count 0."""
     given = dict(scenario.reward_weights), dict(scenario.target_reward_weights)
-    weights = [np.array([each.get(term.name, 0.0) for term in terms], np.float32) for each in given]
-    return Tables(config_record(scenario), slot_records(scenario), beam_directions(scenario), *weights)
+    weights, target_weights = (np.array([each.get(term.name, 0.0) for term in terms], np.float32) for each in given)
+    scratch = new_scratch(SCRATCH, scenario, threads)
+    return Fixed(config_record(scenario), slot_records(scenario), weights, target_weights, worlds, scratch)
 
 
 def kernel_of(declarations: Declarations) -> Callable[..., int]:
@@ -252,14 +242,9 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     def advance(
         fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
     ) -> int:
-        through = Pass(fixed.tables, fixed.worlds, actions, orders, results)
-        s = fixed.scratch[nonnegative(thread)]
-        if s.prepared[0] == ZERO:
-            lay_out_constants(fixed.tables.config[0], fixed.tables.beams, s)
-            s.prepared[0] = ONE
-        over = 0
+        call, scratch, over = Call(actions, orders, results), fixed.scratch[nonnegative(thread)], 0
         for e in range(nonnegative(first), end, WIDTH):
-            over += advance_worlds(e, min(WIDTH, end - e), through, made, s)
+            over += advance_worlds(e, min(WIDTH, end - e), fixed, call, made, scratch)
         return over
 
     return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn

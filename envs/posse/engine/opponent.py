@@ -79,7 +79,8 @@ class PairedBatch(Batch):
         one = isinstance(outside, int)
         super().__init__(scenario if one else scenario.replace(target_motion="agent"), num_worlds, **settings)
         self.inside, self.outside = inside, outside
-        worlds, rows, length = self._all_actions = self.action_shape
+        self.everyone = np.zeros(self.action_shape, np.float32), self._new_results()
+        worlds, rows, length = self.action_shape
         team, target = slice(0, scenario.num_trackers), slice(rows - 1, rows)
         self._mine, self._theirs = (team, target) if outside == "trackers" else (target, team)
         if isinstance(outside, int):
@@ -91,7 +92,6 @@ class PairedBatch(Batch):
         if hasattr(inside, "watch"):
             inside.watch(self)
         self.memory = inside.begin(self.layout, worlds)
-        self._seen = np.zeros((*self._their_shape[:2], self.layout.size), np.float32)
 
     @property
     def working(self) -> BoolArray:
@@ -101,11 +101,11 @@ class PairedBatch(Batch):
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world; see :meth:`Batch.reset`."""
-        before = self.memory, self._seen
+        before = self.memory, self.everyone
         try:
             return super().reset(seed=seed, options=options)
         except BaseException:
-            self.memory, self._seen = before
+            self.memory, self.everyone = before
             raise
 
     def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
@@ -116,29 +116,26 @@ class PairedBatch(Batch):
         if orders is None:
             restarted, (whole, memory) = self.worlds["over"] != 0, self._with_theirs(actions)
         else:
-            restarted, whole, memory = orders != LOOK, np.zeros(self._all_actions, np.float32), self.memory
-        every = results._replace(
-            observations=np.empty((*self._all_actions[:2], self.layout.size), np.float32),
-            rewards=np.empty(self._all_actions[:2], np.float32),
-            terms=np.empty((*self._all_actions[:2], len(self.term_names)), np.float32),
-        )
+            restarted, whole, memory = orders != LOOK, np.zeros_like(self.everyone[0]), self.memory
+        observations, rewards, terms = (np.empty_like(array) for array in self.everyone[1][:3])
+        every = results._replace(observations=observations, rewards=rewards, terms=terms)
         over = super()._advance(whole, every, orders)
         self.everyone = whole, every
         for mine, array in zip(results[:3], every[:3], strict=True):
             mine[...] = array[:, self._mine]
-        self._seen = every.observations[:, self._theirs].copy()
         self.memory = self.inside.restart(memory, restarted) if restarted.any() else memory
         return over
 
     def _with_theirs(self, mine: FloatArray) -> tuple[FloatArray, Any]:
         """Return the actions of all robots, and the memory of the policy inside."""
         who = "target's" if self.outside == "trackers" else "team's"
-        chosen, memory = self.inside.act(self._seen, self.memory)
+        seen = self.everyone[1].observations[:, self._theirs].copy()
+        chosen, memory = self.inside.act(seen, self.memory)
         array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
         theirs = np.ascontiguousarray(array[:, :, : wanted[2]])
-        whole = np.zeros(self._all_actions, np.float32)
+        whole = np.zeros_like(self.everyone[0])
         whole[:, self._theirs, : wanted[2]] = in_box(
             theirs, self.clip_actions, f"the {who} policy returned actions, of which [{{}}, {{}}, {{}}]".format
         )

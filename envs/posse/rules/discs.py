@@ -14,7 +14,6 @@ import numpy as np
 from posse.numeric import (
     ONE,
     WIDTH,
-    ZERO,
     FloatArray,
     Lanes,
     Record,
@@ -31,7 +30,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.kinematics import in_frame
-from posse.rules.state import BIT, DISCS, NO_BITS, POSE, ROBOTS, Pose
+from posse.rules.state import BIT, NO_BITS, POSE, Pose
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -73,19 +72,6 @@ def to_wall(c: Record, x: np.float32, y: np.float32) -> np.float32:
 def surroundings_within(c: Record, obstacles: Records, x: np.float32, y: np.float32, reach: np.float32) -> bool:
     """Return whether a wall, or the rim of an obstacle, is nearer than ``reach`` to a point."""
     return bool(to_wall(c, x, y) < reach or obstacle_within(obstacles, c.num_obstacles, x, y, reach))
-
-
-@compiled
-def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
-    """Write what is the same in all worlds; the directions of the sonar's beams are (2, S)."""
-    for k in range(ROBOTS):
-        s.index[k] = np.float32(k)
-    for k in range(DISCS):
-        s.radius[k] = c.robot_radius
-    count = beams.shape[1]
-    for k in range(WIDTH * blocks(count)):
-        s.beam_cos[k] = beams[0, k] if k < count else ZERO
-        s.beam_sin[k] = beams[1, k] if k < count else ZERO
 
 
 @compiled

@@ -384,10 +384,6 @@ class WorldArrays(NamedTuple):
         for mine, theirs in zip(self, other, strict=True):
             mine[...] = theirs
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        # Arrays unpickled out of band would be read-only and possibly unaligned.
-        return _copied, tuple(self)
-
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
         return {
@@ -400,10 +396,6 @@ def _parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArra
         yield name, array.view()
     for part in array.dtype.names or ():
         yield from _parts(f"{name}_{part}", array[part])
-
-
-def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
-    return WorldArrays(*arrays).copy()
 
 
 def slot_records(scenario: Scenario) -> Records:
@@ -471,8 +463,12 @@ def scratch_record(*fields: tuple[str, int | tuple[int, ...]]) -> np.dtype[Any]:
     return np.dtype((np.record, [(name, _F, np.atleast_1d(shape)) for name, shape in (*fields, ("padding", padding))]))
 
 
-def new_scratch(record: np.dtype[Any], threads: int) -> Records:
-    """Return zeroed scratch memory for one scenario, a record for each thread."""
+def new_scratch(record: np.dtype[Any], scenario: Scenario, threads: int) -> Records:
+    """Return scratch memory, a record for each thread, with what is the same in all worlds of a scenario."""
     memory = np.zeros(threads * record.itemsize + 4 * _LINE, np.uint8)
     start = -memory.ctypes.data % (4 * _LINE)
-    return memory[start : start + threads * record.itemsize].view(record)
+    scratch = memory[start : start + threads * record.itemsize].view(record)
+    scratch["index"], scratch["radius"] = np.arange(ROBOTS), scenario.robot_radius
+    for name, values in zip(("beam_cos", "beam_sin"), beam_directions(scenario), strict=True):
+        scratch[name][:, : scenario.sonar_beams] = values
+    return scratch
