@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.support.learned import network_for, observations_of
+from tests.support.process import run_tests_elsewhere
 
 from posse.numeric import FloatArray
 from posse_baselines import load
@@ -23,8 +22,6 @@ from posse_baselines.safeguard import Guard
 from posse_training.cli import main
 from posse_training.commands.export import export
 
-ROOT = Path(__file__).parents[2]
-ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
 HERE = importlib.util.find_spec("onnxruntime") is not None
 needs_onnx = pytest.mark.skipif(not HERE, reason="run elsewhere, by the test that says so")
 SHIPPED = shipped() | shipped(SHIPPED_TARGETS)
@@ -33,21 +30,7 @@ SHIPPED = shipped() | shipped(SHIPPED_TARGETS)
 @pytest.mark.long
 @pytest.mark.skipif(HERE, reason="they run here")
 def test_exports_are_tested_where_onnx_is_installed(tmp_path: Path) -> None:
-    if not ELSEWHERE.exists():
-        pytest.skip("needs .venv-recipes: make recipes")
-    paths = [str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
-    words = f"-W ignore -m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {tmp_path / 'cases'} {__file__}"
-    done = subprocess.run(
-        [ELSEWHERE, *words.split()],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-    )
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
-    assert ", 1 skipped" in done.stdout
+    assert ", 1 skipped" in run_tests_elsewhere(__file__, tmp_path)
 
 
 def outputs_of(policy: LearnedPolicy, rows: FloatArray, folder: Path) -> Any:
