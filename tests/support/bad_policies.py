@@ -47,34 +47,13 @@ class Nan(_Still):
         return actions * np.float32(np.nan), memory
 
 
-class Sleeps(_Still):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        while True:
-            time.sleep(1)
-
-
-class SleepsInC(_Still):
-    """Hangs in native code that holds the interpreter's lock, so no thread can stop it."""
-
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        ctypes.PyDLL(None).sleep(600)
-        raise AssertionError
-
-
-class HangsWithPid(SleepsInC):
-    """Hangs, after writing its process id."""
+class Hangs(_Still):
+    """Writes its process id, and hangs in native code that holds the interpreter's lock: no thread can stop it."""
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
-        return super().act(observations, memory)
-
-
-class Slow(_Still):
-    """Takes too long in total, but not in a single step."""
-
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        time.sleep(0.3)
-        return super().act(observations, memory)
+        ctypes.PyDLL(None).sleep(600)
+        raise AssertionError
 
 
 class Exits(_Still):
