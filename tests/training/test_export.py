@@ -19,7 +19,6 @@ from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_baselines.safeguard import Guard
-from posse_training.cli import main
 from posse_training.commands.export import export
 
 HERE = importlib.util.find_spec("onnxruntime") is not None
@@ -90,9 +89,3 @@ def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path)
     change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
     action, _ = script.carry_out(observations, memory, change)
     np.testing.assert_allclose(action, wanted, rtol=0, atol=1e-5)
-
-
-@pytest.mark.parametrize(("words", "found"), [("pursuit --out x.onnx", "pursuit"), ("evader --out x.pb", "x.pb")])
-def test_what_cannot_be_exported(words: str, found: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", *words.split()]) == 2
-    assert found in capsys.readouterr().err

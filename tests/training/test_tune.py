@@ -12,7 +12,6 @@ from tests.support.runs import killed_at, quiet
 from tests.support.tunable import BEST, POLICY, small
 
 from posse_baselines import DDCS, Tunable, tunables
-from posse_training.cli import main
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.files import locked
 from posse_training.tune import Space, TuneSettings, _Run, tune
@@ -48,29 +47,6 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     generations = int(card["command"].split("--generations ")[1].split()[0])
     assert generations >= 1
     assert card_of(small(tmp_path / "again", generations=generations)) == card
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["ddcs-distribute"], "did you mean 'ddcs-distributed'"),
-        (["idle"], "policy 'idle' has no tunable settings; those that have: pngl-l-phi, pngl"),
-        (["ddcs-tuned"], "policy 'ddcs-tuned' has no tunable settings"),
-        (["pngl", "--scenario", "smrt"], "unknown scenario 'smrt' (did you mean 'smart'"),
-        (["pngl", "--minutes", "nan"], "minutes=nan must lie in [0.001, 10000]"),
-        (["pngl", "--seed", "-1"], "seed=-1 must lie in"),
-        (["pngl", "--only", "gian"], "only='gian' is not a tunable setting of 'pngl'"),
-    ],
-)
-def test_invalid_settings_are_refused_before_anything_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
-    out = tmp_path / "run"
-    assert main(["tune", *arguments, "--out", str(out)]) == 2
-    error = capsys.readouterr().err
-    assert message in " ".join(error.split())
-    assert "Traceback" not in error
-    assert not out.exists()
 
 
 def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:

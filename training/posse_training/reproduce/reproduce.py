@@ -77,9 +77,9 @@ def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
 
 def reproduce(settings: Settings) -> list[dict[str, Any]]:
     """Play every member of the family, write figures and numbers, and return the numbers."""
-    settings.out.mkdir(parents=True, exist_ok=True)
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     tracker_pose, target_pose = runs.draw_starts(scenario, settings.starts, settings.seed)
+    settings.out.mkdir(parents=True, exist_ok=True)
     starts = {"tracker_pose": tracker_pose, "target_pose": target_pose}
     rows, played = [], {}
     for policy in MEMBERS:
