@@ -56,6 +56,7 @@ COMPARE = ["compare", "idle", "--scenario", "constant", "--episodes", "2"]
         ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif", "--seconds", "1"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
+        pytest.param(["demo", "--episodes", "2", "--seconds", "1"], marks=pytest.mark.long),
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import posse
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
 from posse_training.errors import SettingsError
-from posse_training.leaderboard import CLAIM, Standing, read_standings, standings_text, submit, verify
+from posse_training.leaderboard import CLAIM, Standing, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
 WORLDS = 60
@@ -72,12 +71,6 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
 def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         verify(sent(tmp_path, claim, **changes))
-
-
-def test_a_table_is_read_as_it_was_written(claim: Standing, tmp_path: Path) -> None:
-    rows = [claim, dataclasses.replace(claim, label="other 2", reads_state=True)]
-    (tmp_path / "t.csv").write_text(standings_text(rows), encoding="utf-8")
-    assert read_standings(tmp_path / "t.csv") == rows
 
 
 def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 import pygame
 import pytest
 from PIL import Image
-from tests.support.process import printed
 
 from posse.rendering.canvas import Window
 from posse_training import demo
@@ -106,8 +105,3 @@ def test_the_demo_prints_a_line_for_each_team_then_the_replay_and_the_film(
     assert [player.name for player in read_replay("shown/replay.html").players] == ["ddcs-tuned", "learned-smart"]
     with Image.open("shown/smart.gif") as film:
         assert film.size == (800, 525)
-
-
-def test_the_demo_needs_no_torch() -> None:
-    code = "import sys, posse_training.demo; print('torch' in sys.modules)"
-    assert printed("-c", code).strip() == "False"
