@@ -90,13 +90,6 @@ def test_the_table_of_the_readme_is_made_from_the_result_files(hook: Callable[[s
     assert hook("readme_table").with_table(README) == README
 
 
-def lines(text: str, scenario: str) -> list[list[str]]:
-    part = text.split(f"### {scenario}\n")[1].split("###")[0]
-    return [
-        [cell.strip() for cell in line.strip("|").split("|")] for line in part.splitlines() if line.startswith("|")
-    ][2:]
-
-
 def test_teams_are_ranked_by_the_safe_score(
     hook: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -111,7 +104,9 @@ def test_teams_are_ranked_by_the_safe_score(
     path, standings = tmp_path / "standings.csv", hook("standings")
     path.write_text(standings_text([dataclasses.replace(ROW, **row) for row in rows]), encoding="utf-8")
     monkeypatch.setattr(standings, "STANDINGS", path)
-    listed = lines(standings.leaderboard(), "smart")
+    table = standings.leaderboard().split("### smart\n")[1].split("###")[0]
+    rows_of = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("|")]
+    listed = [[cell.strip() for cell in row] for row in rows_of[2:]]
     assert [row[:2] for row in listed] == [["", "knows (reference)"], ["1", "first"], ["2", "second"], ["3", "third"]]
     assert listed[1][2:] == ["0.550&nbsp;[0.400,&nbsp;0.600]", "75.0%", "1,000", "7", "`932670c`"]
 

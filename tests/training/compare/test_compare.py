@@ -111,15 +111,12 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
 
 
 def test_a_policy_that_cannot_play_is_left_out_with_a_line(
-    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    SCENARIOS["few-beams"] = {"sonar_beams": 4}
-    try:
-        command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
-        options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
-        assert main([*command, *options]) == 0
-    finally:
-        del SCENARIOS["few-beams"]
+    monkeypatch.setitem(SCENARIOS, "few-beams", {"sonar_beams": 4})
+    command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
+    options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
+    assert main([*command, *options]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "left out: any-0 on few-beams:" in shown
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 import posse
-from posse.numeric import FloatArray
-from posse_baselines import BasePolicy, Memory, load, play
+from posse_baselines import BasePolicy, load, play
+from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
 from posse_training.evaluation import statistics
 from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
@@ -24,16 +24,6 @@ def test_an_episode_scores_the_same_however_many_are_played() -> None:
     many = evaluate("pursuit", "smart", 20, seed=5, **FAST)
     for name, column in few.columns.items():
         np.testing.assert_array_equal(column, many[name][:3])
-
-
-class Spinning(BasePolicy):
-    name = "spinning"
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        actions = np.zeros((*observations.shape[:2], 2 + self.message_size), np.float32)
-        actions[..., 0] = -1
-        actions[..., 1] = 1
-        return actions, memory
 
 
 def test_it_plays_the_worlds_of_a_batch() -> None:
@@ -74,7 +64,7 @@ def test_rows_and_settings_are_written_as_files(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("reads", [False, True])
 def test_only_a_policy_that_says_so_is_given_the_state(reads: bool) -> None:
-    class Spy(Spinning):
+    class Spy(Idle):
         given = False
         reads_state = reads
 
