@@ -18,27 +18,23 @@ FORBIDDEN = {
 }
 
 
-def imported_packages(source: Path) -> set[str]:
-    """The top-level packages that a file imports, at whatever depth of its code."""
-    packages: set[str] = set()
+def imported(source: Path) -> set[str]:
+    """The modules that a file imports when it is run or type-checked, at whatever depth of its code."""
+    modules: set[str] = set()
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"), str(source))):
         if isinstance(node, ast.Import):
-            packages.update(alias.name.partition(".")[0] for alias in node.names)
+            modules.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            packages.add(node.module.partition(".")[0])
-    return packages
+            modules.add(node.module)
+    return modules
 
 
 @pytest.mark.parametrize("package", FORBIDDEN)
 def test_imports_run_one_way(package: str) -> None:
     sources = sorted((ROOT / package).rglob("*.py"))
     assert sources
-    wrong = {
-        str(source.relative_to(ROOT)): sorted(found)
-        for source in sources
-        if (found := imported_packages(source) & FORBIDDEN[package])
-    }
-    assert not wrong
+    packages = {str(source): {module.partition(".")[0] for module in imported(source)} for source in sources}
+    assert {source: wrong for source, found in packages.items() if (wrong := found & FORBIDDEN[package])} == {}
 
 
 @pytest.mark.parametrize("package", ["posse", "posse_baselines"])
@@ -52,42 +48,22 @@ ROOMS = ("numeric", "registry", "declarations", "scenarios", "rules", "signals",
 INTERNAL = ("posse.engine", "posse.numeric.", "posse.rules.")
 
 
-def imported_modules(source: Path) -> set[str]:
-    """The modules that a file imports when it is run or type-checked."""
-    modules: set[str] = set()
-    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"), str(source))):
-        if isinstance(node, ast.Import):
-            modules.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            modules.add(node.module)
-    return modules
-
-
-def room_of(module: str) -> str:
-    return [*module.split("."), ""][1]
-
-
 def test_rooms_import_only_the_rooms_before_them() -> None:
     wrong = []
     for source in sorted((ROOT / "envs/posse").rglob("*.py")):
         own = source.relative_to(ROOT / "envs/posse").with_suffix("").parts[0]
-        if own.startswith("__"):
-            continue
-        allowed = {*ROOMS[: ROOMS.index(own)], own}
-        wrong += [
-            f"{source.relative_to(ROOT)} imports {module}"
-            for module in sorted(imported_modules(source))
-            if module.startswith("posse.") and room_of(module) not in allowed
-        ]
+        if not own.startswith("__"):
+            later = tuple(f"posse.{room}" for room in ROOMS[ROOMS.index(own) + 1 :])
+            wrong += [f"{source} imports {module}" for module in imported(source) if module.startswith(later)]
     assert wrong == []
 
 
 @pytest.mark.parametrize("package", ["baselines", "training"])
 def test_other_packages_import_only_the_public_names_of_these_rooms(package: str) -> None:
     wrong = [
-        f"{source.relative_to(ROOT)} imports {module}"
+        f"{source} imports {module}"
         for source in sorted((ROOT / package).rglob("*.py"))
-        for module in sorted(imported_modules(source))
+        for module in imported(source)
         if module.startswith(INTERNAL)
     ]
     assert wrong == []

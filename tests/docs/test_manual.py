@@ -7,14 +7,13 @@ import html
 import importlib
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 from tests.support.browser import Tags
 from tests.support.pages import FENCE, PAGES, ROOT
+from tests.support.process import printed
 
 import posse
 
@@ -33,14 +32,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with (shared / "manual.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
-            done = subprocess.run(
-                [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", partial],
-                cwd=ROOT,
-                capture_output=True,
-                text=True,
-                env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
-            )
-            assert done.returncode == 0, done.stdout + done.stderr
+            printed("-m", "mkdocs", "build", "--strict", "-d", partial, NO_MKDOCS_2_WARNING="1")
             partial.rename(folder)
     return folder
 

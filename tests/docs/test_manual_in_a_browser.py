@@ -18,10 +18,11 @@ PHONE, WIDE = (390, 844), (1300, 1000)
 SCREENS = 10
 LOOK = """() => {
   const count = (all, fault) => [...document.querySelectorAll('.md-typeset ' + all)].filter(fault).length;
-  return [document.documentElement.scrollHeight, count('pre > code', e => e.scrollWidth > e.clientWidth + 1),
+  const { scrollWidth, scrollHeight } = document.documentElement;
+  return [scrollWidth, scrollHeight, count('pre > code', e => e.scrollWidth > e.clientWidth + 1),
     count('.name', e => e.getClientRects().length > 1)];
 }"""
-"""Height of the page, blocks of code that are cut off, and names that are broken inside."""
+"""Width and height of the page, blocks of code that are cut off, and names that are broken inside."""
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
@@ -39,41 +40,26 @@ def address(site: Path) -> Iterator[str]:
 
 
 @pytest.mark.long
-def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> None:
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
+def test_pages_fit_are_short_and_ask_no_other_host(
+    site: Path, address: str, width: int, screen: int, scheme: Literal["light", "dark"]
+) -> None:
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": PHONE[0], "height": PHONE[1]})
+        page = browser.new_page(viewport={"width": width, "height": screen}, color_scheme=scheme)
         asked: list[str] = []
         failed: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.on("pageerror", lambda error: failed.append(str(error)))
         page.on("response", lambda got: failed.append(got.url) if got.status >= 400 else None)
-        wide = []
-        for path in pages(site):
-            if path.name == "index.html":
-                where = path.parent.relative_to(site).as_posix()
-                page.goto(address + ("" if where == "." else where + "/"))
-                if page.evaluate("document.documentElement.scrollWidth") > PHONE[0]:
-                    wide.append(where)
-        own = (address, "data:", "blob:")
-        assert [url for url in asked if not url.startswith(own)] == []
-        assert failed == []
-        assert wide == []
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
-def test_pages_are_short_and_break_no_name(
-    site: Path, address: str, width: int, screen: int, scheme: Literal["light", "dark"]
-) -> None:
-    with chromium() as browser:
-        page = browser.new_page(viewport={"width": width, "height": screen}, color_scheme=scheme)
         faults = []
         for path in pages(site):
             if path.name == "index.html":
                 where = path.parent.relative_to(site).as_posix()
                 page.goto(address + ("" if where == "." else where + "/"))
-                height, cut, broken = page.evaluate(LOOK)
-                if broken or height > SCREENS * screen or (cut and width == WIDE[0]):
-                    faults.append((where, height, cut, broken))
+                wide, height, cut, broken = page.evaluate(LOOK)
+                if wide > width or broken or height > SCREENS * screen or (cut and width == WIDE[0]):
+                    faults.append((where, wide, height, cut, broken))
+        assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
+        assert failed == []
         assert faults == []

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,10 @@ import minari
 import numpy as np
 import pytest
 from tests.support.adapters import part
+from tests.support.runs import killed_at
 
 import posse
-from posse_baselines import Policy, PolicyError
+from posse_baselines import PolicyError
 from posse_training import datasets
 from posse_training.cli import main
 from posse_training.datasets import record_dataset
@@ -58,21 +57,10 @@ def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
     assert [episode.id for episode in data] == list(range(5))
 
 
-def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    played = datasets._episode
-
-    def killed(policy: Policy, settings: posse.Scenario, world: int, *where: Any) -> Any:
-        return os._exit(9) if world == 2 else played(policy, settings, world, *where)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(datasets, "_episode", killed)
-        process = get_context("fork").Process(
-            target=record_dataset, args=("idle", "constant", 30), kwargs={"out": tmp_path, **SHORT}
-        )
-        process.start()
-    process.join(60)
-    assert process.exitcode == 9
-    assert [path for path in tmp_path.rglob("*.hdf5") if ".recording-" not in str(path)] == []
+def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
+    with killed_at(datasets, "_episode", 3):
+        record_dataset("idle", "constant", 30, out=tmp_path, **SHORT)
+    assert list(tmp_path.rglob("*.hdf5")) == []
     assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
 
 

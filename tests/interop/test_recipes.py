@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from tests.support.process import printed
+from tests.support.process import ROOT, elsewhere, printed
 
-ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = dict.fromkeys(
     ("benchmarl_smart", "onnx_policy", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_both"), "recipes"
@@ -20,50 +17,31 @@ LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
 
 
-def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:
-    recipe = RECIPES / f"{name}.py"
-    return printed("-W", "ignore", recipe, *arguments, program=python, cwd=folder, seconds=300)
+NAMES = sorted(path.stem for path in RECIPES.glob("*.py"))
+OURS = [name for name in NAMES if name not in OWN_ENVIRONMENT]
 
 
-def names() -> list[str]:
-    return sorted(path.stem for path in RECIPES.glob("*.py"))
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.long] if name in LONG else [])
-        for name in names()
-        if name not in OWN_ENVIRONMENT
-    ],
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in OURS])
 def test_a_recipe_runs(name: str, tmp_path: Path) -> None:
-    run(name, tmp_path)
+    printed("-W", "ignore", RECIPES / f"{name}.py", cwd=tmp_path, seconds=300)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
 def test_a_recipe_runs_in_an_environment_of_its_own(name: str, tmp_path: Path) -> None:
-    folder = OWN_ENVIRONMENT[name]
-    python = ROOT / f".venv-{folder}" / "bin" / "python"
-    if not python.exists():
-        pytest.skip(f"needs .venv-{folder}: make recipes")
-    run(name, tmp_path, python)
+    elsewhere(RECIPES / f"{name}.py", environment=OWN_ENVIRONMENT[name], cwd=tmp_path, seconds=300)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed"])
 def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> None:
-    python = ROOT / ".venv-recipes" / "bin" / "python"
-    if not python.exists():
-        pytest.skip("needs .venv-recipes: make recipes")
-    lines = run("robotarium", tmp_path, python, [team, "0.5", "3"]).splitlines()
-    settled, clean = (int(part.split()[0]) for part in lines[-1].split(", "))
+    shown = elsewhere(RECIPES / "robotarium.py", team, "0.5", "3", cwd=tmp_path, seconds=300)
+    settled, clean = (int(part.split()[0]) for part in shown.splitlines()[-1].split(", "))
     assert settled >= 19
     assert clean == 20
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", NAMES)
 def test_a_recipe_is_on_a_page(name: str) -> None:
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))
     assert f'--8<-- "docs/recipes/{name}.py"' in pages

@@ -14,25 +14,15 @@ import numpy as np
 
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
+from posse_baselines.policies.simple import Idle
 
 
-class _Still(BasePolicy):
-    """Returns zero actions."""
-
-    name = "still"
-
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        worlds, trackers = observations.shape[:2]
-        width = 2 + memory.scenario.message_size
-        return np.zeros((worlds, trackers, width), np.float32), memory
-
-
-class Raises(_Still):
+class Raises(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         raise ZeroDivisionError("[bold]by zero[/bold]")
 
 
-class RaisesUnpicklable(_Still):
+class RaisesUnpicklable(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         class LocalError(Exception):
             def __reduce__(self) -> Any:
@@ -41,53 +31,32 @@ class RaisesUnpicklable(_Still):
         raise LocalError("local")
 
 
-class Nan(_Still):
+class Nan(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         actions, memory = super().act(observations, memory)
         return actions * np.float32(np.nan), memory
 
 
-class Sleeps(_Still):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        while True:
-            time.sleep(1)
-
-
-class SleepsInC(_Still):
-    """Hangs in native code that holds the interpreter's lock, so no thread can stop it."""
+class Hangs(Idle):
+    """Writes its process id, and hangs in native code that holds the interpreter's lock: no thread can stop it."""
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
         ctypes.PyDLL(None).sleep(600)
         raise AssertionError
 
 
-class HangsWithPid(SleepsInC):
-    """Hangs, after writing its process id."""
-
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
-        return super().act(observations, memory)
-
-
-class Slow(_Still):
-    """Takes too long in total, but not in a single step."""
-
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        time.sleep(0.3)
-        return super().act(observations, memory)
-
-
-class Exits(_Still):
+class Exits(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         sys.exit(0)
 
 
-class Crashes(_Still):
+class Crashes(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         os._exit(9)
 
 
-class RaisesOnLoad(_Still):
+class RaisesOnLoad(Idle):
     def __init__(self) -> None:
         raise LookupError("no weights")
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 import posse
 from posse_baselines import Policy, begin, load
+from posse_baselines.playing import poses_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -81,17 +82,11 @@ def drive(
             actions[:, -1, 1] = omega / s.target_turn_rate
         yield Instant(
             step * s.control_step,
-            poses(state, "tracker"),
-            poses(state, "world"),
+            poses_of(state, "tracker").astype(np.float64),
+            poses_of(state, "world").astype(np.float64),
             np.arctan2(state["world_frame_sin"], state["world_frame_cos"]),
             team.annotations(memory),
             (team_actions[..., :2].astype(np.float64) + np.array([1.0, 0.0])) * limits,
             batch.layout.views(given)["working"] == 0.0,
         )
         observations, *_ = batch.step(actions)
-
-
-def poses(state: dict[str, Any], who: str) -> Floats:
-    """(..., 3) of the trackers or of the target (``world``)."""
-    theta = np.arctan2(state[f"{who}_heading_sin"], state[f"{who}_heading_cos"])
-    return np.stack([state[f"{who}_x"], state[f"{who}_y"], theta], axis=-1).astype(np.float64)

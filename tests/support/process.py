@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -31,6 +33,20 @@ def printed(*words: str | Path, **settings: Any) -> str:
     done = python(*words, **settings)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
     return done.stdout
+
+
+def elsewhere(*words: str | Path, environment: str = "recipes", **settings: Any) -> str:
+    """Return what Python prints in a virtual environment of the recipes; skip the test where there is none."""
+    program = ROOT / f".venv-{environment}" / "bin" / "python"
+    if not program.exists():
+        pytest.skip(f"needs .venv-{environment}: make recipes")
+    return printed("-W", "ignore", *words, program=program, **settings)
+
+
+def run_tests_elsewhere(file: str | Path, folder: Path, **settings: Any) -> str:
+    """Run a file of tests there."""
+    words = f"-m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {folder / 'cases'} {file}"
+    return elsewhere(*words.split(), **settings)
 
 
 def examples(chapter: str) -> dict[str, str]:

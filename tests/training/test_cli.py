@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.support.process import printed
+from tests.support.runs import steps_saved
 
 import posse
 from posse_training.cli import COMMANDS, main
@@ -25,34 +26,70 @@ def test_a_command_imports_only_what_it_needs(words: list[str], heavy: tuple[str
     assert words != ["scenarios"] or all(name in text for name in posse.scenario_names())
 
 
+def status_of(words: list[str]) -> object:
+    try:
+        return main(words)
+    except SystemExit as ended:  # of the parser
+        return ended.code
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    try:
-        status: object = main([name, "--help"])
-    except SystemExit as ended:
-        status = ended.code
-    assert status == 0
+    assert status_of([name, "--help"]) == 0
     assert f"usage: posse {name}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["comprae"], "unknown command 'comprae': did you mean 'compare'?"),
-        (["watch", "nobody"], "unknown policy 'nobody'"),
-        (["watch", "pursuit", "--world", "-1"], "world=-1"),
-        (["watch"], "No policies given"),
-        (["watch", "pursuit", "--out", "film.avi"], "must end in .gif or .mp4"),
-        (["watch", "pursuit", "--out", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
-        (["watch", "pursuit", "--speed", "2"], "--speed is not for a window: leave it out"),
-        (["watch", "pursuit", "--size", "9", "9"], "--size 9 9 must be 200 to 4096 px"),
-        (["reproduce", "--seed", "-1"], "seed=-1"),
-        (["compare", "pursuit", "--episodes", "0"], "episodes=0"),
-    ],
-)
-def test_invalid_arguments_are_named(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(arguments) == 2
-    assert message in capsys.readouterr().err
+INVALID = {
+    "comprae": "unknown command 'comprae': did you mean 'compare'?",
+    "watch nobody": "unknown policy 'nobody'",
+    "watch pursuit --world -1": "world=-1",
+    "watch": "No policies given",
+    "watch pursuit --out film.avi": "must end in .gif or .mp4",
+    "watch pursuit --out film.gif --from 90": "start=90.0 (--from) must be",
+    "watch pursuit --speed 2": "--speed is not for a window: leave it out",
+    "watch pursuit --size 9 9": "--size 9 9 must be 200 to 4096 px",
+    "watch idle --page --out a.gif": "exclude each other",
+    "watch idle": "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): posse watch --page",
+    "play --as tracker_9": "--as tracker_9 is no robot; there are: tracker_0",
+    "play planner": "cannot play against a person",
+    "play --out play.txt": "--out play.txt must end in .html",
+    "play idle": "no window can be opened",
+    "reproduce --seed -1": "seed=-1",
+    "compare pursuit --episodes 0": "episodes=0",
+    "replay": "1 to 4 players, got 0: give at least one policy",
+    "replay idle --set arna=6,4": "did you mean 'arena'",
+    "export pursuit --out x.onnx": "pursuit",
+    "export evader --out x.pb": "x.pb",
+    "tune ddcs-distribute": "did you mean 'ddcs-distributed'",
+    "tune idle": "policy 'idle' has no tunable settings; those that have: pngl-l-phi, pngl",
+    "tune ddcs-tuned": "policy 'ddcs-tuned' has no tunable settings",
+    "tune pngl --scenario smrt": "unknown scenario 'smrt' (did you mean 'smart'",
+    "tune pngl --minutes nan": "minutes=nan must lie in [0.001, 10000]",
+    "tune pngl --seed -1": "seed=-1 must lie in",
+    "tune pngl --only gian": "only='gian' is not a tunable setting of 'pngl'",
+    "train --seed -1": "seed=-1",
+    f"train --steps {10**30}": "steps=",
+    "train --beside nobody": "unknown policy 'nobody'",
+    "train --beside :x": "':x' names no class",
+    "train --imitate pursuit": "safeguard=True goes with neither advise",
+    "train --no-safeguard --imitate nobody": "unknown policy 'nobody'",
+    "train --no-safeguard --advise planner": "'planner'",
+    "train --wandb project": "pip install wandb",
+}
+
+
+@pytest.mark.parametrize("words", INVALID)
+def test_what_is_invalid_is_named_before_anything_is_written(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+    assert status_of(words.split()) == 2
+    shown = " ".join(capsys.readouterr().err.split())
+    assert INVALID[words] in shown
+    assert "Traceback" not in shown
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -78,4 +115,4 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     assert "holds a run with discount=0.99, not 0.9: choose another --out" in capsys.readouterr().err
     assert main([*arguments.split(), "--steps", "1600"]) == 0
     assert "resuming" in capsys.readouterr().out
-    assert json.loads((folder / "settings.json").read_text())["steps"] == 1600
+    assert json.loads((folder / "settings.json").read_text())["steps"] == steps_saved(folder) == 1600

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.support.learned import network_for, observations_of
+from tests.support.process import run_tests_elsewhere
 
 from posse.numeric import FloatArray
 from posse_baselines import load
@@ -20,11 +19,8 @@ from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_baselines.safeguard import Guard
-from posse_training.cli import main
 from posse_training.commands.export import export
 
-ROOT = Path(__file__).parents[2]
-ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
 HERE = importlib.util.find_spec("onnxruntime") is not None
 needs_onnx = pytest.mark.skipif(not HERE, reason="run elsewhere, by the test that says so")
 SHIPPED = shipped() | shipped(SHIPPED_TARGETS)
@@ -33,21 +29,7 @@ SHIPPED = shipped() | shipped(SHIPPED_TARGETS)
 @pytest.mark.long
 @pytest.mark.skipif(HERE, reason="they run here")
 def test_exports_are_tested_where_onnx_is_installed(tmp_path: Path) -> None:
-    if not ELSEWHERE.exists():
-        pytest.skip("needs .venv-recipes: make recipes")
-    paths = [str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
-    words = f"-W ignore -m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {tmp_path / 'cases'} {__file__}"
-    done = subprocess.run(
-        [ELSEWHERE, *words.split()],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-    )
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
-    assert ", 1 skipped" in done.stdout
+    assert ", 1 skipped" in run_tests_elsewhere(__file__, tmp_path)
 
 
 def outputs_of(policy: LearnedPolicy, rows: FloatArray, folder: Path) -> Any:
@@ -107,9 +89,3 @@ def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path)
     change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
     action, _ = script.carry_out(observations, memory, change)
     np.testing.assert_allclose(action, wanted, rtol=0, atol=1e-5)
-
-
-@pytest.mark.parametrize(("words", "found"), [("pursuit --out x.onnx", "pursuit"), ("evader --out x.pb", "x.pb")])
-def test_what_cannot_be_exported(words: str, found: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", *words.split()]) == 2
-    assert found in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import posse
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
 from posse_training.errors import SettingsError
-from posse_training.leaderboard import CLAIM, Standing, read_standings, standings_text, submit, verify
+from posse_training.leaderboard import CLAIM, Standing, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
 WORLDS = 60
@@ -74,12 +73,6 @@ def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dic
         verify(sent(tmp_path, claim, **changes))
 
 
-def test_a_table_is_read_as_it_was_written(claim: Standing, tmp_path: Path) -> None:
-    rows = [claim, dataclasses.replace(claim, label="other 2", reads_state=True)]
-    (tmp_path / "t.csv").write_text(standings_text(rows), encoding="utf-8")
-    assert read_standings(tmp_path / "t.csv") == rows
-
-
 def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
     given = tmp_path / "mine.safetensors"
     given.write_bytes(shipped()["learned-smart"].read_bytes())
@@ -93,10 +86,7 @@ def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
 def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def played(*arguments: object, **settings: object) -> None:
-        raise AssertionError("it was played")
-
-    monkeypatch.setattr(posse.Batch, "step", played)
+    monkeypatch.setattr(posse.Batch, "step", None)
     kept = tmp_path / "kept.txt"
     kept.write_text("mine", encoding="utf-8")
     for wrong in (

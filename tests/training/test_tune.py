@@ -11,8 +11,7 @@ import pytest
 from tests.support.runs import killed_at, quiet
 from tests.support.tunable import BEST, POLICY, small
 
-from posse_baselines import DDCS, Tunable, tunables
-from posse_training.cli import main
+from posse_baselines import DDCS, tunables
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.files import locked
 from posse_training.tune import Space, TuneSettings, _Run, tune
@@ -50,29 +49,6 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     assert card_of(small(tmp_path / "again", generations=generations)) == card
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["ddcs-distribute"], "did you mean 'ddcs-distributed'"),
-        (["idle"], "policy 'idle' has no tunable settings; those that have: pngl-l-phi, pngl"),
-        (["ddcs-tuned"], "policy 'ddcs-tuned' has no tunable settings"),
-        (["pngl", "--scenario", "smrt"], "unknown scenario 'smrt' (did you mean 'smart'"),
-        (["pngl", "--minutes", "nan"], "minutes=nan must lie in [0.001, 10000]"),
-        (["pngl", "--seed", "-1"], "seed=-1 must lie in"),
-        (["pngl", "--only", "gian"], "unknown tunable setting of 'pngl' 'gian' (did you mean 'gain'"),
-    ],
-)
-def test_invalid_settings_are_refused_before_anything_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
-    out = tmp_path / "run"
-    assert main(["tune", *arguments, "--out", str(out)]) == 2
-    error = capsys.readouterr().err
-    assert message in " ".join(error.split())
-    assert "Traceback" not in error
-    assert not out.exists()
-
-
 def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
     run = tmp_path / "run"
     tune(small(run, generations=1), console=quiet())
@@ -95,21 +71,11 @@ def test_a_search_without_any_effect_is_refused(tmp_path: Path) -> None:
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
 
 
-def test_every_point_is_a_setting_that_can_be_played() -> None:
-    found = tunables(DDCS.of("ddcs-distributed").settings)
+def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_default() -> None:
+    settings = DDCS.of("ddcs-distributed").settings
+    found = tunables(settings)
     space = Space(found, [t.name for t in found])
     rng = np.random.default_rng(1)
     for point in [*rng.random((200, len(found))), np.zeros(len(found)), np.ones(len(found))]:
-        DDCS.of("ddcs-distributed").settings.replace(**space.values(point))
-
-
-def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:
-    found = tunables(DDCS.of("pngl-l-phi").settings)
-    for t in found:
-        space = Space(found, [t.name])
-        values = space.values(space.start)
-        assert values[t.name] == pytest.approx(t.default, rel=1e-5, abs=1e-9)
-    wide = Space((Tunable("x", 1.0, 0.1, 10.0, "s"),), ["x"])
-    assert wide.values(np.array([0.25]))["x"] == pytest.approx(10**-0.5, rel=1e-5)
-    narrow = Space((Tunable("x", 1.0, 0.5, 2.5, "s"),), ["x"])
-    assert narrow.values(np.array([0.25]))["x"] == pytest.approx(1.0)
+        settings.replace(**space.values(point))
+    assert space.values(space.start) == pytest.approx({t.name: t.default for t in found}, rel=1e-5, abs=1e-9)

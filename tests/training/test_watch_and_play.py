@@ -10,7 +10,6 @@ from pathlib import Path
 import pygame
 import pytest
 from PIL import Image
-from tests.support.process import printed
 
 from posse.rendering.canvas import Window
 from posse_training import demo
@@ -74,26 +73,6 @@ def test_a_page_is_recorded_and_opened(
     assert "open it in a browser" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["watch", "idle", "--page", "--out", "a.gif"], "exclude each other"),
-        (["watch", "idle"], "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): posse watch --page"),
-        (["play", "--as", "tracker_9"], "--as tracker_9 is no robot; there are: tracker_0"),
-        (["play", "planner"], "cannot play against a person"),
-        (["play", "--out", "play.txt"], "--out play.txt must end in .html"),
-        (["play", "idle"], "no window can be opened"),
-    ],
-)
-def test_invalid_arguments_are_named(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
-        monkeypatch.delenv(name, raising=False)
-    assert main(arguments) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
-
-
 @pytest.mark.parametrize(("robot", "row"), [("target", 5), ("tracker_2", 2)])
 def test_the_arrows_drive_a_robot_and_the_last_round_is_recorded(
     robot: str, row: int, at: At, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -126,8 +105,3 @@ def test_the_demo_prints_a_line_for_each_team_then_the_replay_and_the_film(
     assert [player.name for player in read_replay("shown/replay.html").players] == ["ddcs-tuned", "learned-smart"]
     with Image.open("shown/smart.gif") as film:
         assert film.size == (800, 525)
-
-
-def test_the_demo_needs_no_torch() -> None:
-    code = "import sys, posse_training.demo; print('torch' in sys.modules)"
-    assert printed("-c", code).strip() == "False"

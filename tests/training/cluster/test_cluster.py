@@ -1,43 +1,20 @@
-"""Where a cluster is named, what its results depend on, what needs none, and two nodes of Ray."""
+"""What results on a cluster depend on, what is refused, and two nodes of Ray."""
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.process import printed
+from tests.support.process import run_tests_elsewhere
 
 from posse_baselines import from_function, load
-from posse_training import evaluate, provenance
+from posse_training import provenance
 from posse_training.cli import main
 from posse_training.commands.train import train_on_worker
-from posse_training.errors import ClusterError, MissingExtraError
+from posse_training.errors import ClusterError
 from posse_training.parallel import Job, cut
 from posse_training.train.settings import TrainSettings
-
-COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seed 1 2 --ray", "tune pngl-l-phi --ray")
-
-
-@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
-def test_what_needs_ray_names_the_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for command in COMMANDS:
-        assert main(command.split()) == 2
-        assert "pip install '.[cluster]'" in capsys.readouterr().err
-    with pytest.raises(MissingExtraError, match=r"extra 'cluster' of posse-rl"):
-        evaluate("idle", "smart", 2, ray=True)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("count", "size"), [(1, 5), (10, 5), (11, 5), (7, 1)])
-def test_shards_hold_each_world_once(count: int, size: int) -> None:
-    shards = cut(count, size)
-    assert [world for shard in shards for world in shard] == list(range(count))
-    assert max(map(len, shards)) <= size
 
 
 def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,13 +51,6 @@ def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> 
         train_on_worker(TrainSettings(), tmp_path / "elsewhere")
 
 
-ROOT = Path(__file__).parents[3]
-ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
-
-
 @pytest.mark.long
 def test_on_a_cluster_of_two_nodes(tmp_path: Path) -> None:
-    if not ELSEWHERE.exists():
-        pytest.skip("Ray is not installed: make recipes")
-    words = f"-W ignore -m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {tmp_path / 'cases'}"
-    printed(*words.split(), "tests/support/ray_cases.py", program=ELSEWHERE, RAY_AUTH_MODE="disabled")
+    run_tests_elsewhere("tests/support/ray_cases.py", tmp_path, RAY_AUTH_MODE="disabled")

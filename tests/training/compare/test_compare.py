@@ -12,21 +12,24 @@ from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
 from posse_training.cli import main
-from posse_training.compare.compare import Comparison, Settings, compare
+from posse_training.compare.compare import Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError
 from posse_training.evaluation.statistics import difference
 
+ALONE: dict[str, Any] = {"figures": False, "planner_episodes": 0}
+
+
+def safe_scores(rows: Path) -> Any:
+    with rows.open(newline="") as file:
+        return np.array([float(row["safe_score"]) for row in csv.DictReader(file)])
+
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     names = ("idle", "pursuit")
-    made: dict[str, Any] = {"figures": False, "planner_episodes": 0, "export": ("marl-eval",)}
-    rows = compare(Settings(names, ("constant",), episodes=20, out=tmp_path, **made)).rows
-    scores = {}
-    for name in names:
-        with (tmp_path / f"constant-{name}.csv").open(newline="") as file:
-            scores[name] = np.array([float(row["safe_score"]) for row in csv.DictReader(file)])
+    rows = compare(Settings(names, ("constant",), 20, out=tmp_path, export=("marl-eval",), **ALONE)).rows
+    scores = {name: safe_scores(tmp_path / f"constant-{name}.csv") for name in names}
     assert rows[0]["difference"] is None
     gap = scores["pursuit"] - scores["idle"]
     assert rows[1]["difference"].value == pytest.approx(gap.mean())
@@ -40,10 +43,8 @@ def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
 
 
 def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
-    settings = Settings(
-        ("idle", "pursuit", "ddcs-distributed"), ("smart",), episodes=4, out=tmp_path, figures=False, planner_episodes=2
-    )
-    found = compare(settings)
+    policies, few = ("idle", "pursuit", "ddcs-distributed"), {**ALONE, "planner_episodes": 2}
+    found = compare(Settings(policies, ("smart",), 4, out=tmp_path, **few))
     assert [row["policy"] for row in found.rows][-1] == "planner"
     safe = {row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows}
     assert len(safe["planner"]) == 2, "it plays the first worlds of the others"
@@ -99,32 +100,23 @@ def files(tmp_path: Path) -> list[str]:
 
 def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
     group = f"mine={','.join(files)}"
-    settings = Settings(
-        ("pursuit", group), ("constant",), episodes=15, out=tmp_path / "out", figures=False, planner_episodes=0
-    )
-    found = compare(settings)
+    found = compare(Settings(("pursuit", group), ("constant",), 15, out=tmp_path / "out", **ALONE))
     assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
-    scores = []
-    for k in (1, 2, 3):
-        with (tmp_path / "out" / f"constant-mine-{k}.csv").open(newline="") as file:
-            scores.append([float(row["safe_score"]) for row in csv.DictReader(file)])
+    scores = np.stack([safe_scores(tmp_path / "out" / f"constant-mine-{k}.csv") for k in (1, 2, 3)])
     assert len({tuple(row) for row in scores}) == 3
     reference = found.plays["constant", "pursuit"]["safe_score"]
     assert found.rows[1]["difference"] == difference(scores, reference)
-    better = (np.array(scores) > reference) + 0.5 * (np.array(scores) == reference)
+    better = (scores > reference) + 0.5 * (scores == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
 
 
 def test_a_policy_that_cannot_play_is_left_out_with_a_line(
-    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    SCENARIOS["few-beams"] = {"sonar_beams": 4}
-    try:
-        command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
-        options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
-        assert main([*command, *options]) == 0
-    finally:
-        del SCENARIOS["few-beams"]
+    monkeypatch.setitem(SCENARIOS, "few-beams", {"sonar_beams": 4})
+    command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
+    options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
+    assert main([*command, *options]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "left out: any-0 on few-beams:" in shown
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -146,13 +138,7 @@ def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytes
     assert "planner" in capsys.readouterr().out
 
 
-def test_a_folder_with_any_file_is_refused_before_anything_is_played(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def played(*arguments: object, **settings: object) -> None:
-        raise AssertionError("it was played")
-
-    monkeypatch.setattr(Comparison, "play", played)
+def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(RunFolderError, match="not an empty folder"):
         compare(Settings(("idle",), ("constant",), out=tmp_path))
@@ -163,7 +149,7 @@ def test_a_folder_with_any_file_is_refused_before_anything_is_played(
 
 def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None:
     policies = ("a/b=idle", "a?b=idle", "A/B=pursuit")
-    found = compare(Settings(policies, ("constant",), 1, out=tmp_path, figures=False, planner_episodes=0))
+    found = compare(Settings(policies, ("constant",), 1, out=tmp_path, **ALONE))
     files = [name for row in found.rows for name in row["files"]]
     assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
     assert all((tmp_path / name).is_file() for name in files)

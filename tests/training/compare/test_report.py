@@ -81,33 +81,16 @@ LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 
 
 def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float]]) -> Plays:
-    given = {name: np.atleast_2d(values) for name, values in columns.items()}
-    seeds = len(next(iter(given.values())))
-    return Plays(
-        label,
-        tuple(
-            Results(
-                label,
-                posse.get_scenario(scenario),
-                7,
-                "test",
-                {name: np.asarray(values[k], np.float64) for name, values in given.items()},
-            )
-            for k in range(seeds)
-        ),
-    )
+    """Columns of one training seed, or of several."""
+    given = {name: np.atleast_2d(np.asarray(values, np.float64)) for name, values in columns.items()}
+    seeds = [{name: values[k] for name, values in given.items()} for k in range(len(next(iter(given.values()))))]
+    settings = posse.get_scenario(scenario)
+    return Plays(label, tuple(Results(label, settings, 7, "test", columns) for columns in seeds))
 
 
 def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
-    """The longest line that is drawn in a policy's colour and kind of line."""
-    style = LOOKS[policy]
-    found = [
-        drawn
-        for axis in figure.axes
-        for drawn in axis.lines
-        if drawn.get_color() == style.colour and len(np.atleast_1d(drawn.get_xdata())) > 2
-    ]
-    assert found, policy
+    """The longest line that is drawn in a policy's colour."""
+    found = [each for axis in figure.axes for each in axis.lines if each.get_color() == LOOKS[policy].colour]
     longest = max(found, key=lambda drawn: len(np.atleast_1d(drawn.get_xdata())))
     return list(np.asarray(longest.get_xdata())), list(np.asarray(longest.get_ydata()))
 

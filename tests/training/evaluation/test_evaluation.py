@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 import posse
-from posse.numeric import FloatArray
-from posse_baselines import BasePolicy, Memory, load
+from posse_baselines import BasePolicy, load, play
+from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
 from posse_training.evaluation import statistics
 from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
@@ -26,28 +26,12 @@ def test_an_episode_scores_the_same_however_many_are_played() -> None:
         np.testing.assert_array_equal(column, many[name][:3])
 
 
-class Spinning(BasePolicy):
-    name = "spinning"
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        actions = np.zeros((*observations.shape[:2], 2 + self.message_size), np.float32)
-        actions[..., 0] = -1
-        actions[..., 1] = 1
-        return actions, memory
-
-
-def test_the_score_is_the_mean_of_the_steps_scores() -> None:
+def test_it_plays_the_worlds_of_a_batch() -> None:
     scenario = posse.get_scenario("constant", horizon=80)
     results = evaluate("pursuit", scenario, 4, seed=3, progress=False)
-    batch = posse.Batch(scenario, 4, seed=3, split="test")
-    policy = load("pursuit")
-    memory, observations = policy.begin(batch.layout, 4), batch.reset()
-    scores = []
-    for _ in range(80):
-        actions, memory = policy.act(observations, memory)
-        observations, _, _, _, infos = batch.step(actions)
-        scores.append(infos["score"])
-    np.testing.assert_allclose(results["score"], np.mean(scores, axis=0), rtol=1e-5, atol=1e-6)
+    played = play(posse.Batch(scenario, 4, seed=3, split="test"), load("pursuit"))
+    for name, column in played.items():
+        np.testing.assert_array_equal(results[name], column)
 
 
 def test_a_split_that_a_policy_was_trained_on_is_refused() -> None:
@@ -80,7 +64,7 @@ def test_rows_and_settings_are_written_as_files(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("reads", [False, True])
 def test_only_a_policy_that_says_so_is_given_the_state(reads: bool) -> None:
-    class Spy(Spinning):
+    class Spy(Idle):
         given = False
         reads_state = reads
 
@@ -114,11 +98,8 @@ def test_the_interquartile_mean_ignores_both_tails() -> None:
 
 def test_a_share_has_wilsons_interval() -> None:
     estimate = share([True] * 990 + [False] * 10)
-    z, n, p = stats.norm.ppf(0.975), 1000, 0.99
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    assert estimate.low == pytest.approx(centre - half)
-    assert estimate.high == pytest.approx(centre + half)
+    wanted = stats.binomtest(990, 1000).proportion_ci(method="wilson")
+    assert (estimate.low, estimate.high) == pytest.approx((wanted.low, wanted.high))
     assert share([True] * 20).high == 1.0
 
 

@@ -25,10 +25,6 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
     ("second", "told"),
     [
         (
-            player("b", [*WAY, *FULL[:20], *[0.5] * 10, *FULL[:10]], (31, "dart")),
-            "70 %; most of the difference arose in 1 dart.",
-        ),
-        (
             player("b", [*WAY, *FULL[:20], *[0.0] * 20], (31, "break")),
             "40 %; most of the difference arose after 1 break.",
         ),

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import ALGORITHM_CASES, HORIZON, assert_equal, numbers, quiet, small
+from tests.support.runs import ALGORITHM_CASES, HORIZON, quiet, small
 
 import posse
-from posse_baselines import BasePolicy, PolicyError
+from posse_baselines import BasePolicy
 from posse_baselines.learned import LearnedPolicy
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.checkpoint import read_checkpoint, restore_model
@@ -112,14 +112,6 @@ def test_imitation_copies(tmp_path: Path) -> None:
     # The statistics are those of the expert's observations.
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     np.testing.assert_allclose(normaliser.mean, statistics.mean, rtol=1e-5, atol=1e-6)
-
-
-def test_a_training_can_begin_with_a_copy(tmp_path: Path) -> None:
-    for name in "ab":
-        train(small(tmp_path / name, imitate="pursuit", imitate_rounds=2), console=quiet())
-    assert_equal(numbers(tmp_path / "a"), numbers(tmp_path / "b"))
-    with pytest.raises(PolicyError, match="unknown policy"):
-        train(small(tmp_path / "c", imitate="nobody"), console=quiet())
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHM_CASES)

@@ -11,7 +11,6 @@ import pytest
 from tests.support.runs import resume
 
 import posse
-from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.algorithms import ALGORITHMS, check_algorithm
@@ -20,12 +19,18 @@ from posse_training.train.algorithms import ALGORITHMS, check_algorithm
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
 def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
-    for preset in ("nothing", "residual") if ALGORITHMS[algorithm].on_policy else ("nothing",):
-        found = default_settings(scenario, algorithm, preset=preset)
-        assert TrainSettings.from_dict(json.loads(json.dumps(found.to_dict()))) == found
-    if not ALGORITHMS[algorithm].on_policy:
+    found = {"nothing": default_settings(scenario, algorithm)}
+    if ALGORITHMS[algorithm].on_policy:
+        found["residual"] = default_settings(scenario, algorithm, preset="residual")
+    else:
         with pytest.raises(SettingsError, match="goes with ppo or mappo"):
             default_settings(scenario, algorithm, preset="residual")
+    for preset, settings in found.items():
+        assert TrainSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
+        assert settings.advise == {"nothing": None, "residual": "ddcs-tuned"}[preset]
+        assert settings.safeguard == (preset == "nothing")
+        assert (settings.imitate, settings.end_on_contact) == (None, True)
+    assert replace(found["nothing"], scenario="smart") == default_settings("smart", algorithm, preset="nothing")
 
 
 @pytest.mark.parametrize(
@@ -42,65 +47,19 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
         ({"overrides": {"message_size": 3}}, "use the setting message_size"),
         ({"overrides": {"num_trackers": 3}, "team_sizes": (2,)}, "use the setting team_sizes"),
-    ],
-)
-def test_impossible_settings(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(SettingsError, match=message):
-        replace(TrainSettings(), **changes)
-
-
-def test_the_preset_nothing_learns_from_random_weights_on_every_scenario() -> None:
-    for scenario in (*posse.scenario_names(), "smart,radio"):
-        found = default_settings(scenario, preset="nothing")
-        assert (found.advise, found.imitate, found.safeguard, found.end_on_contact) == (None, None, True, True)
-        assert replace(found, scenario="smart") == default_settings("smart", preset="nothing")
-    assert default_settings("smart") == default_settings("smart", preset="nothing")
-    assert default_settings("smart", preset="residual").advise == "ddcs-tuned"
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
+        ({"advise": "ddcs-distributed", "message_size": 1}, "neither imitate nor message_size"),
+        ({"log_deviation": -1.0, "final_log_deviation": 0.0}, "final_log_deviation=0.0 must not exceed"),
         ({"imitate": "pursuit", "algorithm": "sac"}, "needs algorithm ppo or mappo, not sac: leave it out"),
         ({"algorithm": "dqn"}, "unknown algorithm 'dqn'; algorithms are: ppo"),
     ],
 )
-def test_what_an_algorithm_cannot_do(changes: dict[str, Any], message: str) -> None:
+def test_impossible_settings(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         check_algorithm(replace(TrainSettings(), **changes))
 
 
 @pytest.mark.parametrize(
-    "words",
-    f"seed -1;seed {2**40};steps {10**30};beside nobody;imitate nobody;advise planner;beside :x;wandb project".split(
-        ";"
-    ),
-)
-def test_nothing_is_made_before_settings_are_checked(
-    tmp_path: Path, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    option, value = words.split()
-    try:
-        status: Any = main(["train", "--scenario", "constant", f"--{option}", value, "--out", str(tmp_path / "run")])
-    except SystemExit as error:  # of the parser
-        status = error.code
-    shown = capsys.readouterr().err
-    assert status == 2
-    assert option in shown or value in shown
-    assert not (tmp_path / "run").exists()
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "{",
-        "[]",
-        "null",
-        '{"steps": null}',
-        '{"steps": NaN}',
-        '{"hidden": {"a": 1}}',
-        '{"reward_weights": {"slot": []}}',
-    ],
+    "text", ["{", "[]", '{"steps": NaN}', '{"hidden": {"a": 1}}', '{"reward_weights": {"slot": []}}']
 )
 def test_damaged_settings(tmp_path: Path, text: str) -> None:
     (tmp_path / "settings.json").write_text(text)

@@ -70,16 +70,6 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
         ({"side": "neither"}, "side='neither'"),
         ({"overrides": {"target_motion": "agent"}}, "the setting target"),
         ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "unknown term of a target 'slot'"),
-    ],
-)
-def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
-    with pytest.raises((SettingsError, posse.ScenarioError), match=message):
-        target_run(tmp_path, **changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
         ({"algorithm": "mappo"}, "mappo"),
         ({"team": "nobody"}, "unknown policy 'nobody'"),
         ({"team": "planner"}, "cannot be trained against"),
@@ -87,10 +77,10 @@ def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], messag
         ({"side": "trackers", "team": None, "target": "idle", "reward_weights": {}}, "unknown target 'idle'"),
     ],
 )
-def test_unknown_opponents_are_refused_before_anything_is_made(
+def test_what_fits_no_target_is_refused_before_anything_is_made(
     changes: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    with pytest.raises((PolicyError, SettingsError), match=message):
+    with pytest.raises((PolicyError, SettingsError, posse.ScenarioError), match=message):
         train(target_run(tmp_path / "run", **changes), console=quiet())
     assert not (tmp_path / "run").exists()
 

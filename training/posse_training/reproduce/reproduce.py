@@ -74,9 +74,9 @@ def reproduce(out: Path = Path("runs/paper"), starts: int = 200, seed: int = 7) 
         starts: Number of drawn starts; figures show the run with the median settling time.
         seed: Seed of the starts, in the test split.
     """
-    out.mkdir(parents=True, exist_ok=True)
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     poses = runs.draw_starts(scenario, starts, seed)
+    out.mkdir(parents=True, exist_ok=True)
     played = {policy: runs.run_of(policy, scenario, starts, seed, poses) for policy in MEMBERS}
     rows = [summary(policy, run) for policy, run in played.items()]
     game = runs.played(scenario, seed)
