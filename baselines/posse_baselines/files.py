@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import secrets
 from collections.abc import Iterator
@@ -14,35 +13,28 @@ _PREFIX = ".posse-"
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file such that at any moment either the old or the whole new one exists.
-
-    Raises:
-        OSError: ``path`` is a symbolic link, or it could not be written, for example because the
-            disk is full; nothing is changed. Its ``filename`` is ``path``.
-    """
-    with replacing(path) as partial, partial.open("r+b") as file:
-        file.write(content)
+    """Write a file such that at any moment either the old or the whole new one exists; errors as :func:`replacing`."""
+    with replacing(path) as partial:
+        partial.write_bytes(content)
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a new, empty file beside ``path`` to write to, which replaces ``path`` at the end.
+    """Give the name of a file beside ``path`` to write to, which replaces ``path`` at the end.
 
-    It has a name of its own, so that several writers do not meet, and the suffix of ``path``.
+    No other writer has that name; it has the suffix of ``path``.
 
     Raises:
-        OSError: As in :func:`write_atomically`.
+        OSError: It could not be written, for example because the disk is full; nothing is changed. Its ``filename`` is
+            ``path``.
     """
     partial = path.with_name(f"{_PREFIX}{secrets.token_hex(8)}{path.suffix}")
     try:
-        refuse_link(path)
-        partial.touch(exist_ok=False)
         try:
             yield partial
             partial.replace(path)
-        except BaseException:
+        finally:
             partial.unlink(missing_ok=True)
-            raise
     except OSError as error:
         error.filename, error.filename2 = str(path), None
         raise
@@ -52,16 +44,6 @@ def remove_unfinished(folder: Path) -> None:
     """Remove the files that :func:`replacing` left in a folder when its process was killed."""
     for path in folder.glob(f"{_PREFIX}{'[0-9a-f]' * 16}*"):
         path.unlink(missing_ok=True)
-
-
-def refuse_link(path: Path) -> None:
-    """Raise if a path is a symbolic link, which could lead a write to another folder.
-
-    Raises:
-        OSError: It is.
-    """
-    if path.is_symlink():
-        raise OSError(errno.ELOOP, "a symbolic link is not written to: remove it, or name another file", str(path))
 
 
 def read_json(path: Path) -> Any:
