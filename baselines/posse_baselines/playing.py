@@ -216,7 +216,7 @@ def batch_for(
         PolicyError: The target is an agent that nothing moves, or the policy plans ahead in copies of the worlds, which
             have no target's policy.
     """
-    scenario = scenario if target is None else target.fit(scenario)
+    scenario = scenario if target is None else scenario.replace(target_motion=target.motion)
     moved = None if target is None else target.policy
     if moved is None:
         check_trackers_only(policy, scenario)

@@ -88,8 +88,18 @@ class BasePolicy:
     reads_state: bool = False
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Check that the layout fits, and return the memory of ``num_worlds`` worlds."""
-        check_fits(self, layout)
+        """Return the memory of ``num_worlds`` worlds, here the layout.
+
+        Raises:
+            PolicyError: ``message_size`` of the scenario is too small.
+        """
+        available = layout.scenario.message_size
+        if available < self.message_size:
+            raise PolicyError(
+                f"policy {self.name!r} adds {self.message_size} numbers to each broadcast, but scenario "
+                f"{layout.scenario.name!r} has message_size={available}: make the worlds with "
+                f"message_size={self.message_size}"
+            )
         return layout
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -106,21 +116,6 @@ class BasePolicy:
 
     def __repr__(self) -> str:
         return f"<policy {self.name!r}>"
-
-
-def check_fits(policy: Policy | BasePolicy, layout: ObservationLayout) -> None:
-    """Raise if a policy's messages are longer than the scenario's.
-
-    Raises:
-        PolicyError: ``message_size`` of the scenario is too small.
-    """
-    available = layout.scenario.message_size
-    if available < policy.message_size:
-        raise PolicyError(
-            f"policy {policy.name!r} adds {policy.message_size} numbers to each broadcast, but "
-            f"scenario {layout.scenario.name!r} has message_size={available}: make the worlds with "
-            f"message_size={policy.message_size}"
-        )
 
 
 def check_observations(

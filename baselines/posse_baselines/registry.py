@@ -6,13 +6,14 @@ A target is a scripted motion of the scenario, or a policy that moves it: learne
 from __future__ import annotations
 
 import importlib
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final
 
-from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
+from posse import TARGET_MOTIONS, TargetPolicy
 from posse.declarations import unknown
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
@@ -26,11 +27,8 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
 SHIPPED_TARGETS: Final = SHIPPED / "targets"
 """The folder of the learned targets that come with the package."""
-LEARNED: Final = ("learned-", "corrected-")
-"""Prefixes of the names of learned policies: networks that act, and networks that correct a script."""
 AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
-Worlds = TypeVar("Worlds", bound=Scenario | Family)
 _MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
@@ -52,14 +50,6 @@ class Target:
     def trained_splits(self) -> tuple[str, ...]:
         """Splits whose worlds it was trained on."""
         return tuple(getattr(self.policy, "trained_splits", ()))
-
-    def fit(self, scenario: Worlds) -> Worlds:
-        """Return a scenario or a family with this target.
-
-        Raises:
-            ScenarioError: The scenario's settings do not fit the motion.
-        """
-        return cast("Worlds", scenario.replace(target_motion=self.motion))
 
 
 def policy_names() -> tuple[str, ...]:
@@ -161,10 +151,7 @@ def is_code(policy: str) -> bool:
 
 def is_file(path: str | Path) -> bool:
     """Return whether a path is a file; ``False`` also for a path that no file can have."""
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):
-        return False
+    return os.path.isfile(path)  # noqa: PTH113 (pathlib raises for those)
 
 
 def _from_module(text: str) -> Any:

@@ -35,16 +35,19 @@ class Guard(OwnArrays):
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
+        minds: What it remembers, of another script; default: of ``ddcs-tuned``.
 
     Attributes:
-        inputs: (E, R, 0): what a network reads of it, nothing; as of :class:`posse_baselines.learned.advice.Advice`.
+        minds: What it remembers.
+        inputs: (E, R, k): what a network reads of it; here nothing, k = 0.
     """
 
-    def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
+    def __init__(
+        self, layout: ObservationLayout, num_worlds: int, robots: int | None = None, minds: Minds | None = None
+    ) -> None:
         scenario = layout.scenario
         robots = scenario.num_trackers if robots is None else robots
-        settings = tuned_settings("ddcs-tuned", scenario)
-        self._minds = Minds(layout, settings, num_worlds, robots)
+        self.minds = minds or Minds(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 
@@ -55,7 +58,7 @@ class Guard(OwnArrays):
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
-        self._minds.restart(mask)
+        self.minds.restart(mask)
 
     def actions(self, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
@@ -68,12 +71,12 @@ class Guard(OwnArrays):
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")
-        self._minds.run(guard_all, self._observed, actions)
+        self.minds.run(guard_all, self._observed, actions)
         return actions
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return what it remembers as arrays (E, ...) by name; views, not copies."""
-        return {"observed": self._observed, **self._minds.arrays()}
+        return {"observed": self._observed, "inputs": self.inputs, **self.minds.arrays()}
 
 
 def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)

@@ -101,7 +101,8 @@ def test_a_scripted_target_is_the_scenarios_motion() -> None:
     assert set(target_names()) >= {"constant", "accelerating", "smart"}
     assert "agent" not in target_names()
     target = load_target("accelerating")
-    assert target.fit(SHORT) == SHORT.replace(target_motion="accelerating")
+    assert target.motion == "accelerating"
+    assert target.policy is None
     assert load_target(target) is target
 
 
@@ -118,7 +119,7 @@ def test_a_target_plays_inside_the_worlds_as_beside_them(file: Path) -> None:
         assert target.policy is not None
         team = load("pursuit")
         inside = play(batch_for(team, SHORT, 4, target, seed=2), team)
-        batch = posse.Batch(target.fit(SHORT), 4, seed=2, autoreset="disabled")
+        batch = posse.Batch(SHORT.replace(target_motion=target.motion), 4, seed=2, autoreset="disabled")
         observations = batch.reset()
         memories = begin(team, batch), target.policy.begin(batch.layout, 4)
         while not batch.truncated.all():
@@ -141,7 +142,7 @@ def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match="plays the target's motion ahead"):
         batch_for(load("planner"), SHORT, 1, evader)
     with pytest.raises(PolicyError, match="give a target too"):
-        play(posse.Batch(evader.fit(SHORT), 1), load("pursuit"))
+        play(posse.Batch(SHORT.replace(target_motion="agent"), 1), load("pursuit"))
 
 
 def test_wrong_actions_of_a_target_are_named() -> None:
@@ -169,7 +170,7 @@ def test_an_unknown_target_is_refused(text: str, message: str) -> None:
 def safe_score(target: str) -> float:
     team = load("ddcs-tuned")
     moved = load_target(target)
-    scenario = moved.fit(posse.get_scenario("duel"))
+    scenario = posse.get_scenario("duel", target_motion=moved.motion)
     batch = posse.batch(scenario, 40, seed=3, split="test", message_size=team.message_size, target_policy=moved.policy)
     return float(play(batch, team)["safe_score"].mean())
 

@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse.numeric import BoolArray, FloatArray
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.belief import BELIEF_SIZE
 from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.safeguard import Guard
 
 REACH: Final = np.float32(2.0)
 """Factor of the network's output: spans the whole of [-1, 1] from either end."""
@@ -39,48 +40,36 @@ def check_adviser(policy: Policy | None, *, believes: bool) -> int:
     return 0 if policy is None else MOTION + (BELIEF_SIZE if believes else 0)
 
 
-class Advice(OwnArrays):
-    """The adviser's memory and its answers to the latest observations, in E worlds whose episodes may begin apart.
+class Advice(Guard):
+    """The safeguard of an adviser, which carries out its own velocities as a network corrects them.
 
     Args:
         adviser: A policy of the DDCS.
         layout: Of the observations.
-        num_worlds: E.
+        num_worlds: E; their episodes may begin apart.
         believes: Whether the network reads the adviser's belief.
-
-    Attributes:
-        inputs: (E, N, k), what the network reads in addition to its encoding.
-        memory: Of the adviser.
 
     Raises:
         PolicyError: Another policy.
     """
 
     def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int, *, believes: bool = False) -> None:
-        team = num_worlds, layout.scenario.num_trackers
-        self.inputs = np.zeros((*team, check_adviser(adviser, believes=believes)), np.float32)
-        self.memory = adviser.begin(layout, num_worlds)
+        size = check_adviser(adviser, believes=believes)
+        super().__init__(layout, num_worlds, minds=adviser.begin(layout, num_worlds))
+        self.inputs = np.zeros((*self.minds.me.shape, size), np.float32)
         self._adviser, self._believes = adviser, believes
-        self._asked = np.zeros((*team, layout.size), np.float32)
 
     def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
         """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
         kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
-        self._asked[...] = observations
-        self.inputs[...], self.memory = self._adviser.propose(observations, self.memory, believes=self._believes)
+        super().follow(observations)
+        self.inputs[...], _ = self._adviser.propose(observations, self.minds, believes=self._believes)
         for name, array in self.arrays().items():
             if mask is not None:
                 array[~mask] = kept[name]
 
-    def actions(self, outputs: FloatArray) -> FloatArray:
-        """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2)."""
-        actions, self.memory = self._adviser.carry_out(self._asked, self.memory, REACH * outputs[..., :MOTION])
+    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
+        """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2), corrections of what is wanted."""
+        outputs = np.asarray(wanted)[..., :MOTION]
+        actions, _ = self._adviser.carry_out(self._observed, self.minds, REACH * outputs)
         return np.asarray(actions)
-
-    def restart(self, mask: BoolArray) -> None:
-        """Have the adviser begin anew in the worlds of a mask (E,)."""
-        self.memory = self._adviser.restart(self.memory, mask)
-
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory and the answers as arrays by name; views, not copies."""
-        return {**self._adviser.arrays(self.memory), "inputs": self.inputs, "asked": self._asked}

@@ -42,7 +42,7 @@ class _Memory(NamedTuple):
     num_worlds: int
     robots: int
     encoder: Encoder
-    layer: Advice | Guard | None
+    layer: Guard | None
     """What makes the robots' actions of the network's."""
 
 
@@ -120,7 +120,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """
         super().begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        layer: Advice | Guard | None = Guard(layout, num_worlds) if self.safeguard else None
+        layer = Guard(layout, num_worlds) if self.safeguard else None
         if self.adviser is not None:
             layer = Advice(self.adviser, layout, num_worlds, believes=self.encoding.believes)
         return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), layer)
@@ -153,7 +153,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
-        return {} if self.adviser is None else self.adviser.annotations(memory.layer.memory)
+        return {} if self.adviser is None else self.adviser.annotations(memory.layer.minds)
 
     def description(self) -> dict[str, Any]:
         """Return what its file says beside the tensors, as plain values."""

@@ -22,7 +22,7 @@ from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
 from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
-from posse_baselines.policy import Annotations, Memory, check_fits, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, check_observations
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
@@ -308,6 +308,10 @@ class _Memory(Minds):
         super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
         self.beliefs = Beliefs(plans, layout, num_worlds)
 
+    def restart(self, mask: BoolArray) -> None:
+        super().restart(mask)
+        self.beliefs.restart(np.repeat(mask, self.me.shape[1]))
+
 
 class BeliefPlanner(DDCS):
     """Model-predictive control in a world that each tracker keeps from what it observes and is told.
@@ -329,13 +333,8 @@ class BeliefPlanner(DDCS):
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        check_fits(self, layout)
+        BasePolicy.begin(self, layout, num_worlds)
         return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Reset the memory of the worlds of a mask (E,)."""
-        memory.beliefs.restart(np.repeat(mask, memory.me.shape[1]))
-        return super().restart(memory, mask)
 
     def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""

@@ -205,7 +205,7 @@ class SlotGroup:
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         # What makes the robots' actions of the model's.
-        self._layer: Advice | Guard | None = Guard(batch.layout, worlds) if safeguard else None
+        self._layer = Guard(batch.layout, worlds) if safeguard else None
         if adviser:
             self._layer = Advice(adviser, batch.layout, worlds, believes=encoding.believes)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.

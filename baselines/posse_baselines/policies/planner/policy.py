@@ -12,7 +12,7 @@ from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
 from posse_baselines.policies.planner.law import PLAN_AT_START, WAY, Teams, drive, teams_of
-from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations
+from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_observations
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
 _STANDARD: Final = np.array(
@@ -232,18 +232,13 @@ class Planner(BasePolicy):
         Raises:
             PolicyError: No batch was shown to it, or one of another scenario or size.
         """
-        check_fits(self, layout)
+        super().begin(layout, num_worlds)
         batch = self._batch
-        if batch is None:
+        if batch is None or batch.num_worlds != num_worlds or batch.scenario != layout.scenario:
+            watched = "none" if batch is None else f"{batch.num_worlds} worlds of {batch.scenario.name!r}"
             raise PolicyError(
-                "policy 'planner' plays ahead in copies of the worlds, and observations do not "
-                "hold their state: show it the batch with watch(batch), or use "
-                "posse_baselines.begin(policy, batch)"
-            )
-        if batch.num_worlds != num_worlds or batch.scenario != layout.scenario:
-            raise PolicyError(
-                f"policy 'planner' watches {batch.num_worlds} worlds of {batch.scenario.name!r}, "
-                f"not {num_worlds} of {layout.scenario.name!r}: call watch(batch) before begin()"
+                f"policy 'planner' watches {watched}, not {num_worlds} of {layout.scenario.name!r}, whose state it "
+                "reads: show it their batch with watch(batch), or use posse_baselines.begin(policy, batch)"
             )
         return Search(self.settings, batch)
 
