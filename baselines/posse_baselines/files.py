@@ -47,12 +47,7 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file.
-
-    Raises:
-        OSError: It cannot be read.
-        ValueError: It holds no JSON, or values nested too deeply.
-    """
+    """Return the content of a JSON file; ValueError if it holds none, or values nested too deeply."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:

@@ -290,9 +290,5 @@ def rollout(
 
 
 def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, npt.NDArray[np.float64]]:
-    """Play one episode in every world and return its metrics by name, (E,) each.
-
-    Raises:
-        PolicyError: As :func:`rollout`.
-    """
+    """Play one episode in every world, see :func:`rollout`, and return its metrics by name, (E,) each."""
     return rollout(batch, policy, seed=seed).metrics

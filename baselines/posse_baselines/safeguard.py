@@ -61,13 +61,7 @@ class Guard(OwnArrays):
         self.minds.restart(mask)
 
     def actions(self, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
-
-        To be called once a control step.
-
-        Raises:
-            ValueError: A wanted velocity that is not finite.
-        """
+        """Return the actions that carry out wanted velocities, both (E, R, 2 + m), safely; once a control step."""
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")

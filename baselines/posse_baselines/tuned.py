@@ -64,12 +64,7 @@ def tuned_files(name: str) -> dict[str, Path]:
 
 
 def read_tuned(path: Path) -> TunedDDCS:
-    """Return the policy of a file of tuned settings.
-
-    Raises:
-        PolicyError: It is missing, damaged, of an unknown policy, or has a setting that is not
-            tunable or out of its range.
-    """
+    """Return the policy of a file of tuned settings; PolicyError if it is missing, damaged or has impossible ones."""
     try:
         card = read_json(path)
         policy, scenario, values = card["policy"], card["scenario"], card["settings"]

@@ -30,8 +30,7 @@ MOTION: Final = 2
 def check_adviser(policy: Policy | None, *, believes: bool) -> int:
     """Return how many numbers a network reads in addition to its encoding, with an adviser or without.
 
-    Raises:
-        PolicyError: The policy is none of the DDCS, or there is none whose belief could be read.
+    PolicyError if the adviser is none of the DDCS, or there is none whose belief could be read.
     """
     if policy is None and believes:
         raise PolicyError("a policy that reads an adviser's belief needs an adviser")
@@ -48,9 +47,6 @@ class Advice(Guard):
         layout: Of the observations.
         num_worlds: E; their episodes may begin apart.
         believes: Whether the network reads the adviser's belief.
-
-    Raises:
-        PolicyError: Another policy.
     """
 
     def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int, *, believes: bool = False) -> None:

@@ -107,11 +107,7 @@ class Encoding:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
-        """Return the encoding of :meth:`to_dict`.
-
-        Raises:
-            PolicyError, KeyError, TypeError, ValueError: The values do not describe an encoding.
-        """
+        """Return the encoding of :meth:`to_dict`."""
         fields = tuple(
             EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
             for name, size, unit, unknown, of_neighbour in values["fields"]
@@ -139,8 +135,7 @@ class Encoding:
     def columns(self, layout: ObservationLayout) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """Return the column of each number in an observation, -1 where it is missing, and its value there.
 
-        Raises:
-            PolicyError: The layout lacks a field, or has it in another size or unit.
+        PolicyError if the layout lacks a field, or has it in another size or unit.
         """
         known = {f.name: f for f in layout.fields}
         for mine in self.fields:
@@ -181,11 +176,7 @@ class _Tables(NamedTuple):
 
 
 class Encoder(OwnArrays):
-    """An encoding applied to the observations of one layout.
-
-    Raises:
-        PolicyError: The layout does not fit.
-    """
+    """An encoding applied to the observations of one layout, which has to fit: see :meth:`Encoding.columns`."""
 
     def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
         self.encoding = encoding

@@ -75,14 +75,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         safeguard: bool = False,
     ) -> None:
         size = encoding.size + check_adviser(adviser, believes=encoding.believes)
-        if network.inputs != size:
-            raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
-        if network.outputs < MOTION:
-            raise PolicyError(f"the network gives {network.outputs} numbers, an action has {MOTION} or more")
-        if adviser is not None and network.outputs != MOTION:
+        most = MOTION if adviser is not None else network.outputs  # an adviser sends its own messages
+        if network.inputs != size or not MOTION <= network.outputs <= most:
             raise PolicyError(
-                f"a network with an adviser gives {MOTION} numbers, this one gives "
-                f"{network.outputs}: the adviser sends the messages"
+                f"the network takes {network.inputs} numbers and gives {network.outputs}; encoding and adviser give "
+                f"{size} and take {MOTION}{' or more' if adviser is None else ''}"
             )
         self.network = network
         self.encoding = encoding
@@ -105,19 +102,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         self.name, self.side, self.trained_splits, self.card = name, side, tuple(splits), dict(card)
 
     def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
-        """Return the same policy with another card.
-
-        Raises:
-            PolicyError: An invalid card.
-        """
+        """Return the same policy with another card."""
         return LearnedPolicy(self.network, self.encoding, card, self.adviser, self.safeguard)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds.
-
-        Raises:
-            PolicyError: The layout lacks a field that the network reads, or has another size of it.
-        """
+        """Return the memory of ``num_worlds`` worlds; PolicyError if the layout lacks a field that is read."""
         super().begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         layer = Guard(layout, num_worlds) if self.safeguard else None
@@ -169,21 +158,13 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         }
 
     def save(self, path: Path) -> None:
-        """Write the policy and its card as one file, which replaces an old one atomically.
-
-        Raises:
-            OSError: It could not be written; an old file of that name is unchanged.
-        """
+        """Write the policy and its card as one file, which replaces an old one only as a whole."""
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), self.description())
 
     @classmethod
     def from_file(cls, path: str | Path) -> LearnedPolicy:
-        """Return the policy of a file.
-
-        Raises:
-            PolicyError: There is no such file, or it is damaged, truncated, or not a policy file.
-        """
+        """Return the policy of a file; PolicyError if there is none, or it is damaged or of another kind."""
         path = Path(path)
         tensors, text = _read(path)
         try:
@@ -208,15 +189,12 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 raise PolicyError(
                     f"its adviser {adviser!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
                 )
-            if adviser is not None and description.get("correction") == "motion":
-                raise PolicyError("it corrects the actions of its adviser: install the version that wrote it")
-            encoding = Encoding.from_dict(description["encoding"])
             return cls(
                 network,
-                encoding,
+                Encoding.from_dict(description["encoding"]),
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
-                bool(description.get("safeguard", False)),
+                bool(description["safeguard"]),
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
