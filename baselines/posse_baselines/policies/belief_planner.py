@@ -21,7 +21,7 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
+from posse_baselines.policies.planner import PlannerSettings, Search, actions_of_target
 from posse_baselines.policy import Annotations, BasePolicy, Memory, check_observations
 from posse_baselines.tuned import tuned_settings
 

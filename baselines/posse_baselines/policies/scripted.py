@@ -49,4 +49,4 @@ ABLATIONS: Final = (
     *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-l-l"),
     *("ddcs-centralized-no-exchange", "ddcs-no-radio"),
 )
-"""Policies that show what one part of another is good for; lists of names leave them out."""
+"""Policies that show what one part of another is good for; ``posse policies`` leaves them out."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.law import PLAN_AT_START, WAY, Teams, drive, teams_of
+from posse_baselines.policies.planner_law import PLAN_AT_START, WAY, Teams, drive, teams_of
 from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_observations
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
