@@ -85,9 +85,9 @@ def target_names() -> tuple[str, ...]:
 def load(policy: str | Path) -> Policy:
     """Return a policy by name, from a file, or from ``"package.module:Class"``.
 
-    ``"package.module:Class"`` imports the module and calls the class without arguments: it **runs code**, with all rights
-    of the process. Never pass on such a name from a source that you do not trust. An attribute that already is a policy
-    is returned as it is. Names and files never run code.
+    ``"package.module:Class"`` imports the module and calls the class without arguments: it **runs code**, with all
+    rights of the process. Never pass on such a name from a source that you do not trust. An attribute that already is a
+    policy is returned as it is. Names and files never run code.
 
     Raises:
         PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged or of an unknown

@@ -25,7 +25,7 @@ from posse_baselines.policy import PolicyError
 KINDS: Final = ("plain", "slots", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
 observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
-(:mod:`posse_baselines.learned.advice`), which is no part of the encoding's ``size``."""
+(:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's ``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
@@ -101,13 +101,9 @@ class Encoding:
         """Whether the network also reads the adviser's belief."""
         return self.kind == "belief"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the encoding as plain values."""
-        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(f) for f in self.fields]}
-
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
-        """Return the encoding of :meth:`to_dict`."""
+        """Return the encoding of the values that ``dataclasses.asdict`` gives."""
         fields = tuple(
             EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
             for name, size, unit, unknown, of_neighbour in values["fields"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,15 +19,15 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from posse import ObservationLayout
+from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.files import write_atomically
-from posse_baselines.learned.advice import MOTION, Advice, check_adviser
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
-from posse_baselines.safeguard import Guard
+from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
@@ -54,7 +55,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         encoding: The network's inputs.
         card: Describes the policy: ``name``, ``side``, ``trained_splits``, and anything else on record.
         adviser: Scripted policy whose wanted velocity the network corrects, if any
-            (:mod:`posse_baselines.learned.advice`).
+            (:class:`posse_baselines.safeguard.Advice`).
         safeguard: Whether its actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
 
@@ -148,10 +149,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """Return what its file says beside the tensors, as plain values."""
         return {
             "format": FORMAT,
-            "limit": self.network.limit,
-            "activation": self.network.activation,
-            "output": self.network.output,
-            "encoding": self.encoding.to_dict(),
+            **{name: getattr(self.network, name) for name in ("limit", "activation", "output")},
+            "encoding": asdict(self.encoding),
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
             "safeguard": self.safeguard,
@@ -186,9 +185,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             )
             adviser = description["adviser"]  # a scripted policy of this package: a file never names other code
             if adviser is not None and adviser not in SCRIPTED:
-                raise PolicyError(
-                    f"its adviser {adviser!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
-                )
+                raise PolicyError(f"{unknown('adviser', adviser, SCRIPTED)}: install the version that wrote it")
             return cls(
                 network,
                 Encoding.from_dict(description["encoding"]),
@@ -218,11 +215,9 @@ def _read(path: Path) -> tuple[dict[str, FloatArray], str]:
         raise PolicyError(f"there is no policy file {path}") from None
     except (SafetensorError, OSError, TypeError, ValueError) as error:
         raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error!s:.200}") from error
-    text = metadata.get(_KEY)
-    if text is None:
-        raise PolicyError(f"{path} is a safetensors file, but holds no policy of posse")
+    text = metadata.get(_KEY, "")
     if metadata.get("digest") != _digest(tensors, text):
-        raise PolicyError(f"{path} is damaged: its digest does not match its contents")
+        raise PolicyError(f"{path} holds no policy of posse, or a damaged one: its digest does not match its contents")
     return tensors, text
 
 

@@ -46,7 +46,7 @@ class PlannerSettings:
     look_ahead: float = number(4.0, "s", 0.1, 20.0)
     """How far each try is played ahead."""
     keep: float = number(0.5, "s", 0.01, 20.0)
-    """How long the best is kept before the next planning; no longer than ``look_ahead``."""
+    """How long the best is kept before the next planning."""
     rounds: int = number(2, "", 0, 20)
     """Rounds of variations on the best so far, after the standard ways of playing."""
     varied: float = number(0.5, "", 0.0, 1.0)
@@ -60,11 +60,6 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         check(self)
-        if self.keep > self.look_ahead:
-            raise ValueError(
-                f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "
-                "after it was not played ahead"
-            )
 
 
 class Search(OwnArrays):

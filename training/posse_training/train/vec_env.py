@@ -20,8 +20,7 @@ from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines import Policy
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.learned.advice import MOTION, Advice, check_adviser
-from posse_baselines.safeguard import Guard
+from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
 from posse_training.train.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -42,7 +41,7 @@ class TeamVecEnv(VecEnv):
             team sizes may differ.
         encoding: Which inputs are read from an observation.
         adviser: Policy whose proposals are appended to the observations, and corrected by the
-            actions (2,) (:mod:`posse_baselines.learned.advice`).
+            actions (2,) (:class:`posse_baselines.safeguard.Advice`).
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`); an adviser has one of its own.
         see_state: Append the state of the world, for a centralized critic

@@ -11,7 +11,7 @@ import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import check_adviser
+from posse_baselines.safeguard import check_adviser
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
