@@ -23,10 +23,7 @@ class Network(OwnArrays):
     """A network with its input normalisation, all float32.
 
     x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
-    the activation between them; ``output`` brings the result into [-1, 1].
-
-    Raises:
-        PolicyError: Shapes that do not chain, numbers that are not finite, unknown functions.
+    the activation between them; ``output`` brings the result into [-1, 1]. PolicyError if that is impossible.
     """
 
     mean: FloatArray

@@ -22,7 +22,7 @@ from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
 from posse_baselines.policies.planner import PlannerSettings, Search, actions_of_target
-from posse_baselines.policy import Annotations, BasePolicy, Memory, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
@@ -47,11 +47,7 @@ _SEEN: Final = record_type(
 
 @dataclass(frozen=True, kw_only=True)
 class BeliefSettings:
-    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata.
-
-    Raises:
-        ValueError: A number out of its range.
-    """
+    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata."""
 
     plan: PlannerSettings = field(default_factory=PlannerSettings)
     """How far it plays ahead, and what it tries."""
@@ -341,12 +337,11 @@ class BeliefPlanner(DDCS):
         proposals, memory = super().propose(observations, memory, believes=believes)
         me, mates, team, beliefs = memory.me, memory.mates, memory.team, memory.beliefs
         shape = me.shape
-        observations = check_observations(self, observations, shape[0], memory.layout)
         plans = beliefs.search.teams.plans.reshape(mates.shape)
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
-        actions = beliefs.act(observations, self._working(memory)).reshape(*shape, 2)
+        actions = beliefs.act(np.asarray(observations, np.float32), self._working(memory)).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.

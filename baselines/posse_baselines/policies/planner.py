@@ -12,7 +12,7 @@ from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
 from posse_baselines.policies.planner_law import PLAN_AT_START, WAY, Teams, drive, teams_of
-from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_observations
+from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
 _STANDARD: Final = np.array(
@@ -37,11 +37,7 @@ _REPEAT: Final = 64  # plannings after which the variations repeat
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerSettings:
-    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata.
-
-    Raises:
-        ValueError: A number out of its range.
-    """
+    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata."""
 
     look_ahead: float = number(4.0, "s", 0.1, 20.0)
     """How far each try is played ahead."""
@@ -222,11 +218,7 @@ class Planner(BasePolicy):
         self._batch = batch
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the batch that is being watched.
-
-        Raises:
-            PolicyError: No batch was shown to it, or one of another scenario or size.
-        """
+        """Return the memory for the batch that is watched; PolicyError if there is none, or it is another one."""
         super().begin(layout, num_worlds)
         batch = self._batch
         if batch is None or batch.num_worlds != num_worlds or batch.scenario != layout.scenario:
@@ -239,9 +231,7 @@ class Planner(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions for the state that the watched batch is in; observations are not read."""
-        search: Search = memory
-        check_observations(self, observations, search.batch.num_worlds, search.batch.layout)
-        return search.actions(), search
+        return memory.actions(), memory
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Forget the plans of the worlds of a mask (E,)."""
