@@ -25,7 +25,7 @@ import tyro
 from posse import Scenario, get_scenario
 from posse_baselines import Target, load_target
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.registry import LEARNED, SHIPPED, SHIPPED_TARGETS
+from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import difference, mean
@@ -34,6 +34,8 @@ from posse_training.provenance import commit
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, SETTINGS, TrainSettings, read_settings
 
+LEARNED: Final = ("learned-", "corrected-")
+"""Prefixes of the names of teams: networks that act, and networks that correct a script."""
 SPLIT: Final = "validation"
 CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
 CHECK_SEED: Final = 2

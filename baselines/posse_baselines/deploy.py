@@ -10,12 +10,14 @@ from posse import Command, Robot
 from posse_baselines.policy import Policy, PolicyError
 
 
-class Deployed:
-    """What :func:`deploy` returns: a policy that drives one robot, memory inside.
+class deploy:  # noqa: N801 (used as a function is)
+    """A policy that drives one robot, memory inside.
+
+    Args:
+        policy: The policy; one that reads the state of the worlds is a ``PolicyError``.
+        robot: The robot; its scenario needs a ``message_size`` of at least the policy's.
 
     Attributes:
-        policy: The policy.
-        robot: The robot.
         row: (F,) the robot's last observation.
     """
 
@@ -39,12 +41,5 @@ class Deployed:
         return self.robot.command(actions[0, self.robot.number])
 
 
-def deploy(policy: Policy, robot: Robot) -> Deployed:
-    """Return a policy that drives one robot.
-
-    The robot's scenario needs a ``message_size`` of at least the policy's.
-
-    Raises:
-        PolicyError: The policy reads the state, or does not fit the robot's scenario.
-    """
-    return Deployed(policy, robot)
+Deployed = deploy
+"""The type of what :func:`deploy` returns."""

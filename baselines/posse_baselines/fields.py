@@ -52,12 +52,7 @@ def _text(number: float) -> str:
 
 
 def check(settings: Any) -> None:
-    """Check the fields of a settings object against what they declare.
-
-    Raises:
-        ValueError: An unknown choice, a number of another kind or out of its range, or one that does not exceed the
-            field that it must exceed.
-    """
+    """Raise a ValueError for the first field of a settings object that is not as it declares itself."""
     for field in dataclasses.fields(settings):
         name, value, meta = field.name, getattr(settings, field.name), field.metadata
         choices = meta.get("choices", (value,))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import secrets
 from collections.abc import Iterator
@@ -14,14 +13,9 @@ _PREFIX = ".posse-"
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file such that at any moment either the old or the whole new one exists.
-
-    Raises:
-        OSError: ``path`` is a symbolic link, or it could not be written, for example because the
-            disk is full; nothing is changed. Its ``filename`` is ``path``.
-    """
-    with replacing(path) as partial, partial.open("r+b") as file:
-        file.write(content)
+    """Write a file such that at any moment either the old or the whole new one exists; errors as :func:`replacing`."""
+    with replacing(path) as partial:
+        partial.write_bytes(content)
 
 
 def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
@@ -31,23 +25,21 @@ def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a new, empty file beside ``path`` to write to, which replaces ``path`` at the end.
+    """Give the name of a file beside ``path`` to write to, which replaces ``path`` at the end.
 
-    It has a name of its own, so that several writers do not meet, and the suffix of ``path``.
+    No other writer has that name; it has the suffix of ``path``.
 
     Raises:
-        OSError: As in :func:`write_atomically`.
+        OSError: It could not be written, for example because the disk is full; nothing is changed. Its ``filename`` is
+            ``path``.
     """
     partial = path.with_name(f"{_PREFIX}{secrets.token_hex(8)}{path.suffix}")
     try:
-        refuse_link(path)
-        partial.touch(exist_ok=False)
         try:
             yield partial
             partial.replace(path)
-        except BaseException:
+        finally:
             partial.unlink(missing_ok=True)
-            raise
     except OSError as error:
         error.filename, error.filename2 = str(path), None
         raise
@@ -59,23 +51,8 @@ def remove_unfinished(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def refuse_link(path: Path) -> None:
-    """Raise if a path is a symbolic link, which could lead a write to another folder.
-
-    Raises:
-        OSError: It is.
-    """
-    if path.is_symlink():
-        raise OSError(errno.ELOOP, "a symbolic link is not written to: remove it, or name another file", str(path))
-
-
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file.
-
-    Raises:
-        OSError: It cannot be read.
-        ValueError: It holds no JSON, or values nested too deeply.
-    """
+    """Return the content of a JSON file; ValueError if it holds none, or values nested too deeply."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:

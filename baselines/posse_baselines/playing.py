@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -105,10 +105,8 @@ class Recorder:
 
     def __init__(self, batch: Batch, record: Iterable[str] = ()) -> None:
         self.batch = batch
-        asked = [each for name in record for each in (batch.state if name == "state" else [name])]
-        self._names = tuple(dict.fromkeys(asked))
-        known = (*_FRAMES, *_STEPS, "state", *batch.state)
-        for name in self._names:
+        names, known = tuple(record), (*_FRAMES, *_STEPS, "state", *batch.state)
+        for name in names:
             if name not in known:
                 raise ValueError(f"record={name!r} is unknown; names are: {', '.join(known)}")
             if name not in _STEPS and batch.autoreset == "same_step":
@@ -116,6 +114,8 @@ class Recorder:
                     f"record={name!r} is not possible with autoreset='same_step', which overwrites the last state of "
                     "an episode: make the batch with autoreset='disabled' or 'next_step'"
                 )
+        groups = {"state": tuple(batch.state), "terms": ("reward",), "annotations": ("annotation",)}
+        self._names = dict.fromkeys(each for name in names for each in groups.get(name, (name,)))
         self._clear()
 
     def _clear(self) -> None:
@@ -136,8 +136,6 @@ class Recorder:
         self, actions: npt.ArrayLike, annotations: Annotations | None = None
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance the batch (see :meth:`posse.Batch.step`) and record the step, with the annotations of a policy."""
-        rows: dict[str, Any] = {}
-        rows["annotations"] = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
@@ -148,29 +146,30 @@ class Recorder:
                 column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
                 column[ended] = infos[f"metrics/{name}"][ended]
             self.over |= ended
-        rows |= {"score": infos["score"], "terminated": terminated, "truncated": truncated, "rewards": rewards}
-        rows["actions"] = np.array(actions, np.float32)
-        rows["terms"] = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
+        terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
         if isinstance(self.batch, PairedBatch):
-            rows["actions"], every = self.batch.everyone
-            observations, rows["rewards"] = every.observations, every.rewards
-            rows["terms"] = dict(zip(rows["terms"], np.moveaxis(every.terms, -1, 0), strict=True))
-        for name in self._names:
-            if name in _STEPS:
-                for each, row in (rows[name] if isinstance(rows[name], dict) else {name: rows[name]}).items():
-                    self._rows[each].append(row)
+            actions, every = self.batch.everyone
+            observations, rewards = every.observations, every.rewards
+            terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
+        notes = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
+        ends = {"terminated": terminated, "truncated": truncated}
+        self._keep({"score": infos["score"], "rewards": rewards, "actions": np.array(actions, np.float32), **ends})
+        self._keep(terms | notes)
         self._keep_frame(observations)
         return done
 
     def _keep_frame(self, observations: FloatArray) -> None:
         state = self.batch.state
-        for name in self._names:
-            if name == "observations":
-                self._rows[name].append(observations)
-            elif name in ("tracker_pose", "target_pose"):
-                self._rows[name].append(poses_of(state, "world" if name == "target_pose" else "tracker"))
-            elif name not in _STEPS:
-                self._rows[name].append(state[name].copy())
+        poses = {"tracker_pose": "tracker", "target_pose": "world"}
+        self._keep({name: poses_of(state, who) for name, who in poses.items() if name in self._names})
+        self._keep({name: state[name].copy() for name in self._names if name in state})
+        self._keep({"observations": observations})
+
+    def _keep(self, rows: Mapping[str, Array]) -> None:
+        """Keep of these rows what is to be recorded, by its name or that of its group, before the slash."""
+        for name, row in rows.items():
+            if name.partition("/")[0] in self._names:
+                self._rows[name].append(row)
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded since the reset."""
@@ -187,8 +186,7 @@ def poses_of(state: Mapping[str, Array], who: str) -> Array:
     return np.stack([state[f"{who}_x"], state[f"{who}_y"], heading], axis=-1)
 
 
-@dataclass(frozen=True)
-class Played:
+class Played(NamedTuple):
     """One control step of :func:`rollout`.
 
     Attributes:
@@ -216,29 +214,26 @@ def batch_for(
         PolicyError: The target is an agent that nothing moves, or the policy plans ahead in copies of the worlds, which
             have no target's policy.
     """
-    scenario = scenario if target is None else target.fit(scenario)
     moved = None if target is None else target.policy
-    if moved is None:
-        check_trackers_only(policy, scenario)
-    elif policy.reads_state:
+    if moved is not None and policy.reads_state:
         raise PolicyError(
             f"{policy.name!r} reads the state and plays the target's motion ahead: it cannot play against a target "
             "that is moved by a policy"
         )
     size = max(scenario.message_size, policy.message_size)
-    return posse.batch(scenario.replace(message_size=size), num_worlds, target_policy=moved, **settings)
+    motion = scenario.target_motion if target is None else target.motion
+    scenario = scenario.replace(message_size=size, target_motion=motion)
+    batch = posse.batch(scenario, num_worlds, target_policy=moved, **settings)
+    _check_target_moves(policy, batch)
+    return batch
 
 
-def check_trackers_only(policy: Policy, scenario: Scenario) -> None:
-    """Raise if the target of a scenario is an agent, which no policy of trackers moves.
-
-    Raises:
-        PolicyError: The message says how to pair the policy with one of a target.
-    """
-    if scenario.num_agents != scenario.num_trackers:
+def _check_target_moves(policy: Policy, batch: Batch) -> None:
+    """Raise if the target is an agent and no policy in the batch moves it."""
+    if batch.scenario.num_agents != batch.scenario.num_trackers and not isinstance(batch, PairedBatch):
         raise PolicyError(
-            f"the target of {scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give a "
-            "target too, target=, or play it with posse play"
+            f"the target of {batch.scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give "
+            "a target too, target=, or play it with posse play"
         )
 
 
@@ -271,8 +266,7 @@ def rollout(
     """
     if steps is not None and steps < 1:
         raise ValueError(f"steps={steps} must be at least 1")
-    if batch.observation_shape[1] == batch.scenario.num_agents:
-        check_trackers_only(policy, batch.scenario)
+    _check_target_moves(policy, batch)
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)
@@ -296,9 +290,5 @@ def rollout(
 
 
 def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, npt.NDArray[np.float64]]:
-    """Play one episode in every world and return its metrics by name, (E,) each.
-
-    Raises:
-        PolicyError: As :func:`rollout`.
-    """
+    """Play one episode in every world, see :func:`rollout`, and return its metrics by name, (E,) each."""
     return rollout(batch, policy, seed=seed).metrics

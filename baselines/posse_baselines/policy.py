@@ -51,11 +51,7 @@ class Policy(Protocol):
     reads_state: bool
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the first step of ``num_worlds`` worlds.
-
-        Raises:
-            PolicyError: The layout lacks something that the policy needs.
-        """
+        """Return the memory for the first step of ``num_worlds`` worlds; PolicyError if the layout does not fit."""
         ...
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -88,8 +84,14 @@ class BasePolicy:
     reads_state: bool = False
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Check that the layout fits, and return the memory of ``num_worlds`` worlds."""
-        check_fits(self, layout)
+        """Return the memory of ``num_worlds`` worlds, here the layout; PolicyError if its messages are too small."""
+        available = layout.scenario.message_size
+        if available < self.message_size:
+            raise PolicyError(
+                f"policy {self.name!r} adds {self.message_size} numbers to each broadcast, but scenario "
+                f"{layout.scenario.name!r} has message_size={available}: make the worlds with "
+                f"message_size={self.message_size}"
+            )
         return layout
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -108,21 +110,6 @@ class BasePolicy:
         return f"<policy {self.name!r}>"
 
 
-def check_fits(policy: Policy | BasePolicy, layout: ObservationLayout) -> None:
-    """Raise if a policy's messages are longer than the scenario's.
-
-    Raises:
-        PolicyError: ``message_size`` of the scenario is too small.
-    """
-    available = layout.scenario.message_size
-    if available < policy.message_size:
-        raise PolicyError(
-            f"policy {policy.name!r} adds {policy.message_size} numbers to each broadcast, but "
-            f"scenario {layout.scenario.name!r} has message_size={available}: make the worlds with "
-            f"message_size={policy.message_size}"
-        )
-
-
 def check_observations(
     policy: Policy | BasePolicy,
     observations: npt.ArrayLike,
@@ -130,10 +117,9 @@ def check_observations(
     layout: ObservationLayout,
     rows: int | None = None,
 ) -> FloatArray:
-    """Return the observations as kernels take them; ``rows``: by default one for each tracker.
+    """Return the observations as kernels take them; PolicyError if they are not (E, rows, F) of a memory's layout.
 
-    Raises:
-        PolicyError: They are not (E, N, F) of the layout that the memory was made for.
+    There is by default one row for each tracker.
     """
     array = np.ascontiguousarray(observations, np.float32)
     wanted = (num_worlds, layout.scenario.num_trackers if rows is None else rows, layout.size)
@@ -146,11 +132,7 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy for a batch; one with ``reads_state = True`` is given the batch.
-
-    Raises:
-        PolicyError: The policy does not fit the batch.
-    """
+    """Return the memory of a policy for a batch, which one with ``reads_state = True`` is given."""
     if policy.reads_state and isinstance(policy, StateReader):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
@@ -177,11 +159,7 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         self._discrete = discrete_actions
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the function's actions, (E, N, 2 + m), and the memory.
-
-        Raises:
-            PolicyError: The function returns something of another shape.
-        """
+        """Return the function's actions, (E, N, 2 + m), and the memory; PolicyError if they have another shape."""
         found = np.asarray(self._function(observations))
         numbered = self._discrete and found.dtype.kind in "iu"
         chosen = MOTIONS[found] if numbered else found
@@ -201,10 +179,8 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
 def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
     """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
 
-    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
-
-    Raises:
-        PolicyError: There are no trackers, or one is missing.
+    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out. A tracker that is missing
+    is a ``PolicyError``.
     """
     names = [name for name in observations if name.startswith("tracker_")]
     wanted = [f"tracker_{i}" for i in range(len(names))]

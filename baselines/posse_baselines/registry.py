@@ -6,17 +6,19 @@ A target is a scripted motion of the scenario, or a policy that moves it: learne
 from __future__ import annotations
 
 import importlib
+import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final
 
-from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
+from posse import TARGET_MOTIONS, TargetPolicy
 from posse.declarations import unknown
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
-from posse_baselines.policies.scripted import ABLATIONS, SCRIPTED
+from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import read_tuned
 
@@ -26,11 +28,10 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
 SHIPPED_TARGETS: Final = SHIPPED / "targets"
 """The folder of the learned targets that come with the package."""
-LEARNED: Final = ("learned-", "corrected-")
-"""Prefixes of the names of learned policies: networks that act, and networks that correct a script."""
 AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
-Worlds = TypeVar("Worlds", bound=Scenario | Family)
+Makers = dict[str, Callable[[], Any]]
+"""What makes each policy, or target, that comes with the package."""
 _MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
@@ -53,47 +54,47 @@ class Target:
         """Splits whose worlds it was trained on."""
         return tuple(getattr(self.policy, "trained_splits", ()))
 
-    def fit(self, scenario: Worlds) -> Worlds:
-        """Return a scenario or a family with this target.
-
-        Raises:
-            ScenarioError: The scenario's settings do not fit the motion.
-        """
-        return cast("Worlds", scenario.replace(target_motion=self.motion))
-
-
-def policy_names() -> tuple[str, ...]:
-    """Return the names of all policies that come with the package, learned ones last."""
-    return (*SCRIPTED, *shipped())
-
 
 def shipped(folder: Path = SHIPPED) -> dict[str, Path]:
     """Return the files of the learned policies that come with the package, or of the targets, by name."""
     return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
 
 
+def _teams() -> Makers:
+    return {**SCRIPTED, **{name: partial(LearnedPolicy.from_file, path) for name, path in shipped().items()}}
+
+
+def _targets() -> Makers:
+    """Return the motions that are declared, the targets that read nothing, and the learned ones."""
+    scripted = {name: partial(Target, name, name) for name in TARGET_MOTIONS if name != AGENT}
+    blind = {name: partial(Target, name, AGENT, policy) for name, policy in OPEN_LOOP.items()}
+    learned = shipped(SHIPPED_TARGETS).items()
+    return {**scripted, **blind, **{name: partial(LearnedPolicy.from_file, path) for name, path in learned}}
+
+
+def policy_names() -> tuple[str, ...]:
+    """Return the names of all policies that come with the package, learned ones last."""
+    return tuple(_teams())
+
+
 def target_names() -> tuple[str, ...]:
-    """Return the names of all targets: the motions that are declared, those that read nothing, the learned ones."""
-    return (*(name for name in TARGET_MOTIONS if name != AGENT), *OPEN_LOOP, *shipped(SHIPPED_TARGETS))
+    """Return the names of all targets."""
+    return tuple(_targets())
 
 
 def load(policy: str | Path) -> Policy:
     """Return a policy by name, from a file, or from ``"package.module:Class"``.
 
-    ``"package.module:Class"`` imports the module and calls the class without arguments: it **runs
-    code**, with all rights of the process. Never pass on such a name from a source that you do not
-    trust. An attribute that already is a policy is returned as it is. Names and files never run
-    code.
+    ``"package.module:Class"`` imports the module and calls the class without arguments: it **runs code**, with all
+    rights of the process. Never pass on such a name from a source that you do not trust. An attribute that already is a
+    policy is returned as it is. Names and files never run code.
 
     Raises:
-        PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged
-            or of an unknown kind, a module or class that cannot be found or fails, or one that is
-            not a policy, or moves the target.
+        PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged or of an unknown
+            kind, a module or class that cannot be found or fails, or one that is no policy of a team.
     """
     text = str(policy)
-    if text in SCRIPTED:
-        return SCRIPTED[text]()
-    found = _found("policy", text, shipped(), FILES, [name for name in policy_names() if name not in ABLATIONS])
+    found = _found("policy", text, _teams(), FILES)
     if getattr(found, "side", "trackers") == "target":
         raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
     if not isinstance(found, Policy):
@@ -107,23 +108,18 @@ def load(policy: str | Path) -> Policy:
 def load_target(target: str | Path | Target) -> Target:
     """Return a target by name, from a policy file, or from ``"package.module:Class"``.
 
-    ``"package.module:Class"`` **runs code**, as with :func:`posse_baselines.load`; the object needs
-    the methods of :class:`posse.TargetPolicy`. A target is returned as it is.
+    ``"package.module:Class"`` **runs code**, as with :func:`posse_baselines.load`; the object needs the methods of
+    :class:`posse.TargetPolicy`. A target is returned as it is.
 
     Raises:
-        PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged
-            or the policy of a team, a module or class that cannot be found, fails or lacks a
-            method.
+        PolicyError: As with :func:`posse_baselines.load`; or the policy of a team.
     """
     if isinstance(target, Target):
         return target
     text = str(target)
-    if text in TARGET_MOTIONS and text != AGENT:
-        return Target(text, text)
-    if text in OPEN_LOOP:
-        return Target(text, AGENT, OPEN_LOOP[text])
-    readers = {".safetensors": LearnedPolicy.from_file}
-    found = _found("target", text, shipped(SHIPPED_TARGETS), readers, target_names())
+    found = _found("target", text, _targets(), {".safetensors": LearnedPolicy.from_file})
+    if isinstance(found, Target):
+        return found
     if getattr(found, "side", "target") != "target":
         raise PolicyError(f"{text!r} is the policy of a team, {found.name!r}, not of a target")
     missing = [name for name in ("begin", "act", "restart") if not callable(getattr(found, name, None))]
@@ -134,24 +130,20 @@ def load_target(target: str | Path | Target) -> Target:
     return Target(getattr(found, "name", text), AGENT, found)
 
 
-def _found(
-    kind: str,
-    text: str,
-    shipped: Mapping[str, Path],
-    readers: Mapping[str, Callable[[Path], Any]],
-    names: Iterable[str],
-) -> Any:
-    """Return what a shipped name, a file or ``"package.module:Class"`` stands for."""
-    path = shipped.get(text, Path(text))
-    if path.suffix in readers or is_file(path):
-        if path.suffix not in readers:
-            raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(readers)}")
+def _found(kind: str, text: str, known: Makers, readers: Mapping[str, Callable[[Path], Any]]) -> Any:
+    """Return what a name, a file or ``"package.module:Class"`` stands for."""
+    if text in known:
+        return known[text]()
+    path = Path(text)
+    if path.suffix in readers:
         return readers[path.suffix](path)
+    if is_file(path):
+        raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(readers)}")
     if ":" in text:
         return _from_module(text)
     if is_file(path / "best.safetensors"):
         raise PolicyError(f"{text!r} is a run folder: its policy is {path / 'best.safetensors'}")
-    raise PolicyError(f'{unknown(kind, text, names)}, a file, or "package.module:Class"')
+    raise PolicyError(f'{unknown(kind, text, known)}, a file, or "package.module:Class"')
 
 
 def is_code(policy: str) -> bool:
@@ -161,10 +153,7 @@ def is_code(policy: str) -> bool:
 
 def is_file(path: str | Path) -> bool:
     """Return whether a path is a file; ``False`` also for a path that no file can have."""
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):
-        return False
+    return os.path.isfile(path)  # noqa: PTH113 (pathlib raises for those)
 
 
 def _from_module(text: str) -> Any:
@@ -174,14 +163,11 @@ def _from_module(text: str) -> Any:
     module_name, _, attribute = text.partition(":")
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:  # whatever the module's code raises
-        why = f"{error}" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
-        raise PolicyError(f"cannot import {module_name!r:.120}: {why}") from error
-    if not hasattr(module, attribute):
-        names = [name for name in vars(module) if not name.startswith("_")]
-        raise PolicyError(f"in module {module_name!r}: {unknown('name', attribute, names)}")
-    found: Any = getattr(module, attribute)
-    try:
+        if not hasattr(module, attribute):
+            raise AttributeError(unknown("name", attribute, [name for name in vars(module) if name[0] != "_"]))
+        found: Any = getattr(module, attribute)
         return found() if isinstance(found, type) else found
-    except Exception as error:  # whatever the class raises
-        raise PolicyError(f"{text!r} cannot be created without arguments: {type(error).__name__}: {error}") from error
+    except Exception as error:  # whatever the module's code raises
+        raise PolicyError(
+            f"{text!r:.120} cannot be created without arguments: {type(error).__name__}: {error}"
+        ) from error

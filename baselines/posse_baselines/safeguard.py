@@ -5,13 +5,14 @@ makes it safe and carries it out as speed and turn rate; the message behind it p
 the monitoring of the surroundings and the safeguard run, with the settings that ``ddcs-tuned`` has for the scenario:
 without a wanted velocity a robot stays where it is, but for what it evades.
 
-:func:`Safeguard` puts the layer before an environment, :class:`Guard` is the layer itself.
+:func:`Safeguard` puts the layer before an environment, :class:`Guard` is the layer itself, and :class:`Advice` one with
+the whole script, whose velocities a network corrects.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import gymnasium
 import numpy as np
@@ -22,10 +23,17 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import guard_all
+from posse_baselines.ddcs.belief import BELIEF_SIZE
 from posse_baselines.ddcs.memory import Minds
-from posse_baselines.policy import PolicyError, split_agents, stack_agents
+from posse_baselines.policy import Policy, PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
+
+REACH: Final = np.float32(2.0)
+"""Factor of the network's output: spans the whole of [-1, 1] from either end."""
+MOTION: Final = 2
+"""Numbers of an action that move the tracker; a proposal adds as many inputs."""
 
 
 class Guard(OwnArrays):
@@ -35,16 +43,19 @@ class Guard(OwnArrays):
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
+        minds: What it remembers, of another script; default: of ``ddcs-tuned``.
 
     Attributes:
-        inputs: (E, R, 0): what a network reads of it, nothing; as of :class:`posse_baselines.learned.advice.Advice`.
+        minds: What it remembers.
+        inputs: (E, R, k): what a network reads of it; here nothing, k = 0.
     """
 
-    def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
+    def __init__(
+        self, layout: ObservationLayout, num_worlds: int, robots: int | None = None, minds: Minds | None = None
+    ) -> None:
         scenario = layout.scenario
         robots = scenario.num_trackers if robots is None else robots
-        settings = tuned_settings("ddcs-tuned", scenario)
-        self._minds = Minds(layout, settings, num_worlds, robots)
+        self.minds = minds or Minds(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots)
         self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
 
@@ -55,25 +66,69 @@ class Guard(OwnArrays):
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
-        self._minds.restart(mask)
+        self.minds.restart(mask)
 
     def actions(self, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
-
-        To be called once a control step.
-
-        Raises:
-            ValueError: A wanted velocity that is not finite.
-        """
+        """Return the actions that carry out wanted velocities, both (E, R, 2 + m), safely; once a control step."""
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")
-        self._minds.run(guard_all, self._observed, actions)
+        self.minds.run(guard_all, self._observed, actions)
         return actions
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return what it remembers as arrays (E, ...) by name; views, not copies."""
-        return {"observed": self._observed, **self._minds.arrays()}
+        return {"observed": self._observed, "inputs": self.inputs, **self.minds.arrays()}
+
+
+def check_adviser(policy: Policy | None, *, believes: bool) -> int:
+    """Return how many numbers a network reads in addition to its encoding, with an adviser or without.
+
+    PolicyError if the adviser is none of the DDCS, or there is none whose belief could be read.
+    """
+    if policy is None and believes:
+        raise PolicyError("a policy that reads an adviser's belief needs an adviser")
+    if policy is not None and not isinstance(policy, DDCS):
+        raise PolicyError(f"{policy.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
+    return 0 if policy is None else MOTION + (BELIEF_SIZE if believes else 0)
+
+
+class Advice(Guard):
+    """The safeguard of a scripted adviser, which carries out the velocities of the script as a network corrects them.
+
+    Residual policy learning: at each step the adviser, a team of the DDCS, proposes the velocity that it wants, the
+    network reads the proposal together with the observation, and twice its output is added to the proposal, before the
+    safeguard. An output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are
+    sent unchanged, and its memory is its own, so the network needs no memory. References: Silver et al. 2018, Johannink
+    et al. 2019; Alshiekh et al. 2018 (safeguard).
+
+    Args:
+        adviser: A policy of the DDCS.
+        layout: Of the observations.
+        num_worlds: E; their episodes may begin apart.
+        believes: Whether the network reads the adviser's belief.
+    """
+
+    def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int, *, believes: bool = False) -> None:
+        size = check_adviser(adviser, believes=believes)
+        super().__init__(layout, num_worlds, minds=adviser.begin(layout, num_worlds))
+        self.inputs = np.zeros((*self.minds.me.shape, size), np.float32)
+        self._adviser, self._believes = adviser, believes
+
+    def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
+        """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
+        kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
+        super().follow(observations)
+        self.inputs[...], _ = self._adviser.propose(observations, self.minds, believes=self._believes)
+        for name, array in self.arrays().items():
+            if mask is not None:
+                array[~mask] = kept[name]
+
+    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
+        """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2), corrections of what is wanted."""
+        outputs = np.asarray(wanted)[..., :MOTION]
+        actions, _ = self._adviser.carry_out(self._observed, self.minds, REACH * outputs)
+        return np.asarray(actions)
 
 
 def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import gymnasium
@@ -18,7 +17,6 @@ class _WithTeammates:
     """The team-mates of one tracker in every world of a batch."""
 
     _rows: int | slice = 0
-    _fit: Any
 
     def __init__(
         self,
@@ -30,8 +28,16 @@ class _WithTeammates:
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
         self.number, self._silent = number, silent
-        self._fit = functools.partial(_fitting, self.teammates, number)
         super().__init__(*arguments, **settings)
+
+    def _fit(self, scenario: str | Scenario, **overrides: Any) -> Scenario:
+        """Return the scenario with messages as long as the team-mates need."""
+        found = team_scenario(scenario, **overrides)
+        if found.num_trackers < 2:
+            raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")
+        if self.number not in range(found.num_trackers):
+            raise ValueError(f"number={self.number!r} is not in the team: trackers are 0 to {found.num_trackers - 1}")
+        return found.replace(message_size=max(found.message_size, self.teammates.message_size))
 
     def _make(self, scenario: Scenario, num_worlds: int, target_policy: Any, **settings: Any) -> Batch:
         if target_policy is not None:
@@ -67,16 +73,6 @@ class TrackerEnv(_WithTeammates, TeamEnv):
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
     """:class:`TrackerEnv` in E worlds, stepped together; arguments as there and for :class:`TeamVectorEnv`."""
-
-
-def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:
-    """Return the scenario with messages as long as the team-mates need."""
-    found = team_scenario(scenario, **overrides)
-    if found.num_trackers < 2:
-        raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")
-    if number not in range(found.num_trackers):
-        raise ValueError(f"number={number!r} is not in the team: trackers are 0 to {found.num_trackers - 1}")
-    return found.replace(message_size=max(found.message_size, teammates.message_size))
 
 
 def register() -> None:

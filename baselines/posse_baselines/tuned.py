@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posse import Scenario
+from posse.declarations import unknown
 from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import tunables
@@ -24,38 +25,31 @@ FORMAT: Final = "posse-tuned-1"
 
 
 class TunedDDCS(DDCS):
-    """A DDCS policy that plays the settings tuned for the scenario that it is given.
+    """A DDCS policy whose settings a search found: those of a file, or those that ship for the scenario it is given.
 
-    On a scenario without a file of its own it plays the policy that was tuned, unchanged. Which
-    file is played depends on the scenario's name alone, whatever else is overridden.
+    Which shipped file is played depends on the scenario's name alone, whatever else is overridden.
 
     Args:
-        name: One of :data:`TUNED`.
+        settings: Of the file; of a policy of :data:`TUNED`, those that are played where no file ships.
+        name: Its name.
+        card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
+            tuned for, and more; ``None``: those that ship.
     """
 
     trained_splits = ("train",)
 
-    def __init__(self, name: str) -> None:
-        super().__init__(FAMILY[TUNED[name]], name)
+    def __init__(self, settings: Settings, name: str, card: Mapping[str, Any] | None = None) -> None:
+        super().__init__(settings, name)
+        self.card: Mapping[str, Any] = card or {}
+
+    @classmethod
+    def of(cls, name: str) -> TunedDDCS:
+        """Return one of :data:`TUNED`."""
+        return cls(FAMILY[TUNED[name]], name)
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return :func:`tuned_settings`."""
-        return tuned_settings(self.name, scenario)
-
-
-class TunedFile(DDCS):
-    """A DDCS policy that plays the settings of one file on every scenario.
-
-    Attributes:
-        card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
-            tuned for, and more.
-    """
-
-    trained_splits = ("train",)
-
-    def __init__(self, settings: Settings, card: Mapping[str, Any]) -> None:
-        super().__init__(settings, f"{card['policy']}-tuned-{card['scenario']}")
-        self.card = card
+        """Return the settings that are played on a scenario."""
+        return self.settings if self.card else tuned_settings(self.name, scenario)
 
 
 def tuned_settings(name: str, scenario: Scenario) -> Settings:
@@ -69,37 +63,20 @@ def tuned_files(name: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted((SHIPPED_TUNED / name).glob("*.json"))}
 
 
-def read_tuned(path: Path) -> TunedFile:
-    """Return the policy of a file of tuned settings.
-
-    Raises:
-        PolicyError: It is missing, damaged, of an unknown policy, or has a setting that is not
-            tunable or out of its range.
-    """
+def read_tuned(path: Path) -> TunedDDCS:
+    """Return the policy of a file of tuned settings; PolicyError if it is missing, damaged or has impossible ones."""
     try:
         card = read_json(path)
-    except FileNotFoundError:
-        raise PolicyError(f"there is no policy file {path}") from None
-    except (OSError, ValueError) as error:
-        raise PolicyError(f"{path} is damaged or cannot be read: {error}") from error
-    if not isinstance(card, dict) or card.get("format") != FORMAT:
-        raise PolicyError(f"{path} holds no tuned settings: it must have format={FORMAT!r}")
-    policy, scenario, values = card.get("policy"), card.get("scenario"), card.get("settings")
-    if not isinstance(policy, str) or policy not in FAMILY:
-        raise PolicyError(
-            f"{path} has settings of policy={policy!r:.80}; policies with settings are: {', '.join(FAMILY)}"
-        )
-    if not isinstance(scenario, str) or not isinstance(values, dict):
-        raise PolicyError(f"{path} is damaged: it must have the name of a scenario, and settings by name")
-    known = [tunable.name for tunable in tunables(FAMILY[policy])]
-    for name in values:
-        if name not in known:
-            raise PolicyError(
-                f"{path} has a setting {name!r:.80} that is not a tunable one of {policy}; these "
-                f"are: {', '.join(known)}"
-            )
-    try:
+        policy, scenario, values = card["policy"], card["scenario"], card["settings"]
+        if card["format"] != FORMAT:
+            raise ValueError(f"it must have format={FORMAT!r}")
+        if policy not in FAMILY:
+            raise ValueError(unknown("policy with settings", policy, FAMILY))
+        known = [tunable.name for tunable in tunables(FAMILY[policy])]
+        for name in values:
+            if name not in known:
+                raise ValueError(unknown(f"tunable setting of {policy}", name, known))
         settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
-    except (TypeError, ValueError, OverflowError) as error:
-        raise PolicyError(f"{path} has impossible settings: {error}") from error
-    return TunedFile(settings, card)
+    except (OSError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise PolicyError(f"{path} holds no tuned settings: {type(error).__name__}: {error!s:.1000}") from error
+    return TunedDDCS(settings, f"{policy}-tuned-{scenario}", card)

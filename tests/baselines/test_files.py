@@ -59,16 +59,6 @@ def test_an_error_names_the_file_that_could_not_be_written(tmp_path: Path) -> No
     assert caught.value.filename == str(tmp_path / "none" / "file")
 
 
-def test_a_link_is_refused_and_what_it_leads_to_is_left_alone(tmp_path: Path) -> None:
-    elsewhere, path = tmp_path / "elsewhere", tmp_path / "file"
-    elsewhere.write_bytes(b"precious")
-    path.symlink_to(elsewhere)
-    with pytest.raises(OSError, match="symbolic link is not written to: remove it"):
-        write_atomically(path, b"new")
-    assert path.is_symlink()
-    assert elsewhere.read_bytes() == b"precious"
-
-
 @pytest.mark.parametrize("text", ["[" * 100_000, "{", "9" * 5000, ""])
 def test_json_that_cannot_be_read(tmp_path: Path, text: str) -> None:
     (tmp_path / "file.json").write_text(text)

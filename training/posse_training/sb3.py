@@ -21,7 +21,7 @@ from posse.adapters.actions import MOTIONS  # noqa: E402
 from posse.numeric import BoolArray, FloatArray  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.learned import Encoder, Encoding  # noqa: E402
-from posse_baselines.policy import BasePolicy, check_fits, check_observations  # noqa: E402
+from posse_baselines.policy import BasePolicy, check_observations  # noqa: E402
 from posse_baselines.safeguard import Guard  # noqa: E402
 from posse_training.train.vec_env import TeamVecEnv  # noqa: E402
 
@@ -77,7 +77,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states."""
-        check_fits(self, layout)
+        super().begin(layout, num_worlds)
         encoder = None if self._encoding is None else Encoder(self._encoding, layout)
         size = layout.size if self._encoding is None else self._encoding.size
         wanted = self.model.observation_space.shape

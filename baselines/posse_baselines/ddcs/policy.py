@@ -14,7 +14,7 @@ from posse_baselines.ddcs.belief import BELIEF, believe_all
 from posse_baselines.ddcs.memory import Kernel, Minds, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
 
 
 class DDCS(OwnArrays, BasePolicy):
@@ -60,7 +60,7 @@ class DDCS(OwnArrays, BasePolicy):
         Raises:
             PolicyError: The scenario's messages are too small.
         """
-        check_fits(self, layout)
+        super().begin(layout, num_worlds)
         scenario = layout.scenario
         return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
 

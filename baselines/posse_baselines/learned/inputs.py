@@ -25,7 +25,7 @@ from posse_baselines.policy import PolicyError
 KINDS: Final = ("plain", "slots", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
 observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
-(:mod:`posse_baselines.learned.advice`), which is no part of the encoding's ``size``."""
+(:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's ``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
@@ -48,9 +48,6 @@ class Encoding:
         kind: One of :data:`KINDS`.
         neighbours: Number of team-mates that it reads, nearest first.
         fields: The fields that it reads; a team-mate's fields are listed once.
-
-    Raises:
-        PolicyError: An unknown kind, or a number out of its range.
     """
 
     kind: str
@@ -101,17 +98,9 @@ class Encoding:
         """Whether the network also reads the adviser's belief."""
         return self.kind == "belief"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the encoding as plain values."""
-        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(f) for f in self.fields]}
-
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
-        """Return the encoding of :meth:`to_dict`.
-
-        Raises:
-            PolicyError, KeyError, TypeError, ValueError: The values do not describe an encoding.
-        """
+        """Return the encoding of the values that ``dataclasses.asdict`` gives."""
         fields = tuple(
             EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
             for name, size, unit, unknown, of_neighbour in values["fields"]
@@ -139,16 +128,15 @@ class Encoding:
     def columns(self, layout: ObservationLayout) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """Return the column of each number in an observation, -1 where it is missing, and its value there.
 
-        Raises:
-            PolicyError: The layout lacks a field, or has it in another size or unit.
+        PolicyError if the layout lacks a field, or has it in another size or unit.
         """
         known = {f.name: f for f in layout.fields}
         for mine in self.fields:
             theirs = known.get(mine.name)
-            size = theirs.size if theirs else 0
-            if mine.name == "neighbour_message":  # surplus numbers of messages are left out
-                size = min(size, mine.size)
-            if theirs and (size, theirs.unit) == (mine.size, mine.unit):
+            most = (
+                math.inf if mine.name == "neighbour_message" else mine.size
+            )  # surplus numbers of messages are left out
+            if theirs and theirs.unit == mine.unit and mine.size <= theirs.size <= most:
                 continue
             found = f"{theirs.size} x {theirs.unit!r}" if theirs else "no such field"
             raise PolicyError(
@@ -166,55 +154,35 @@ class Encoding:
         return np.array(columns, np.int64), np.array(unknown, np.float32)
 
 
-class _Tables(NamedTuple):
-    """An encoding for one layout, as the kernel reads it."""
-
-    columns: npt.NDArray[np.int64]
-    unknown: FloatArray
-    offsets: Records
-    """(1,) of the fields in the observation."""
-    slots: npt.NDArray[np.complex64]
-    """(N,) positions in the slot frame, m."""
-    teams: Records
-    """What the features are computed in, one a thread."""
-    ways: FloatArray
-
-
 class Encoder(OwnArrays):
-    """An encoding applied to the observations of one layout.
-
-    Raises:
-        PolicyError: The layout does not fit.
-    """
+    """An encoding applied to the observations of one layout, which has to fit: see :meth:`Encoding.columns`."""
 
     def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
         self.encoding = encoding
+        self._columns, self._unknown = encoding.columns(layout)
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
+        # What features are computed in, one of each for a thread.
         work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
-        self._tables = _Tables(*encoding.columns(layout), offsets_of(layout), slots, *work)
+        self._for_features = offsets_of(layout), slots, *work
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
-        features = np.zeros(len(rows) if self.encoding.with_features else 0, FEATURES)
-        # The threads share out rows as if each were a world of one tracker.
-        over_worlds(_encode_rows, (rows, self._tables, features, out), len(rows), 1)
         if self.encoding.with_features:
+            features = np.zeros(len(rows), FEATURES)
+            # The threads share out rows as if each were a world of one tracker.
+            over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
             out[:, :NUM_FEATURES] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)
+        read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
+        read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
+        read[:, missing] = self._unknown[missing]
         return out
 
 
 @kernel
-def _encode_rows(
-    rows: FloatArray, tables: _Tables, features: Records, out: FloatArray, thread: int, first: int, end: int
-) -> None:
-    n = out.shape[1] - len(tables.columns)
+def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
+    offsets, slots, teams, ways = given
     for r in range(first, end):
-        if len(features):
-            at, slots, team, ways = tables.offsets[0], tables.slots, tables.teams[thread], tables.ways[thread]
-            write_features(rows[r], at, slots, team, ways, features[r])
-        for k in range(len(tables.columns)):
-            c = tables.columns[k]
-            out[r, n + k] = rows[r, c] if c >= 0 else tables.unknown[k]
+        write_features(rows[r], offsets[0], slots, teams[thread], ways[thread], features[r])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,10 +23,7 @@ class Network(OwnArrays):
     """A network with its input normalisation, all float32.
 
     x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
-    the activation between them; ``output`` brings the result into [-1, 1].
-
-    Raises:
-        PolicyError: Shapes that do not chain, numbers that are not finite, unknown functions.
+    the activation between them; ``output`` brings the result into [-1, 1]. PolicyError if that is impossible.
     """
 
     mean: FloatArray
@@ -42,20 +40,13 @@ class Network(OwnArrays):
                 f"unknown activation {self.activation!r:.80} or output {self.output!r:.80}: "
                 f"known are {', '.join(ACTIVATIONS)} and {', '.join(OUTPUTS)}"
             )
-        if not self.weights or len(self.weights) != len(self.biases):
-            raise PolicyError("a network needs as many biases as weights, at least one of each")
-        if self.mean.ndim != 1 or self.scale.shape != self.mean.shape:
-            raise PolicyError(
-                f"input statistics of shapes {self.mean.shape} and {self.scale.shape}: both must be (inputs,)"
-            )
-        size = self.inputs
-        for weight, bias in zip(self.weights, self.biases, strict=True):
-            if weight.ndim != 2 or weight.shape[1] != size or bias.shape != weight.shape[:1]:
-                raise PolicyError(
-                    f"a layer of shape {weight.shape} with bias {bias.shape} does not follow one "
-                    f"that gives {size} numbers"
-                )
-            size = weight.shape[0]
+        shapes = {name: array.shape for name, array in self.tensors().items()}
+        sizes = [self.inputs, *map(len, self.biases)]
+        wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("normaliser.mean", "normaliser.scale"), (self.inputs,))
+        for k, (before, after) in enumerate(pairwise(sizes)):
+            wanted |= {f"layers.{k}.weight": (after, before), f"layers.{k}.bias": (after,)}
+        if not self.weights or shapes != wanted:
+            raise PolicyError(f"arrays of shapes {shapes} are no layers one after the other, from {self.inputs} inputs")
         for array in self.tensors().values():
             if array.dtype != np.float32 or not np.isfinite(array).all():
                 raise PolicyError("a network's numbers must be finite float32")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,15 +19,15 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from posse import ObservationLayout
+from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.files import write_atomically
-from posse_baselines.learned.advice import MOTION, Advice, check_adviser
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
-from posse_baselines.safeguard import Guard
+from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
@@ -42,7 +43,7 @@ class _Memory(NamedTuple):
     num_worlds: int
     robots: int
     encoder: Encoder
-    layer: Advice | Guard | None
+    layer: Guard | None
     """What makes the robots' actions of the network's."""
 
 
@@ -54,7 +55,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         encoding: The network's inputs.
         card: Describes the policy: ``name``, ``side``, ``trained_splits``, and anything else on record.
         adviser: Scripted policy whose wanted velocity the network corrects, if any
-            (:mod:`posse_baselines.learned.advice`).
+            (:class:`posse_baselines.safeguard.Advice`).
         safeguard: Whether its actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
 
@@ -75,14 +76,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         safeguard: bool = False,
     ) -> None:
         size = encoding.size + check_adviser(adviser, believes=encoding.believes)
-        if network.inputs != size:
-            raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
-        if network.outputs < MOTION:
-            raise PolicyError(f"the network gives {network.outputs} numbers, an action has {MOTION} or more")
-        if adviser is not None and network.outputs != MOTION:
+        most = MOTION if adviser is not None else network.outputs  # an adviser sends its own messages
+        if network.inputs != size or not MOTION <= network.outputs <= most:
             raise PolicyError(
-                f"a network with an adviser gives {MOTION} numbers, this one gives "
-                f"{network.outputs}: the adviser sends the messages"
+                f"the network takes {network.inputs} numbers and gives {network.outputs}; encoding and adviser give "
+                f"{size} and take {MOTION}{' or more' if adviser is None else ''}"
             )
         self.network = network
         self.encoding = encoding
@@ -105,22 +103,14 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         self.name, self.side, self.trained_splits, self.card = name, side, tuple(splits), dict(card)
 
     def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
-        """Return the same policy with another card.
-
-        Raises:
-            PolicyError: An invalid card.
-        """
+        """Return the same policy with another card."""
         return LearnedPolicy(self.network, self.encoding, card, self.adviser, self.safeguard)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds.
-
-        Raises:
-            PolicyError: The layout lacks a field that the network reads, or has another size of it.
-        """
+        """Return the memory of ``num_worlds`` worlds; PolicyError if the layout lacks a field that is read."""
         super().begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        layer: Advice | Guard | None = Guard(layout, num_worlds) if self.safeguard else None
+        layer = Guard(layout, num_worlds) if self.safeguard else None
         if self.adviser is not None:
             layer = Advice(self.adviser, layout, num_worlds, believes=self.encoding.believes)
         return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), layer)
@@ -153,37 +143,27 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
-        return {} if self.adviser is None else self.adviser.annotations(memory.layer.memory)
+        return {} if self.adviser is None else self.adviser.annotations(memory.layer.minds)
 
     def description(self) -> dict[str, Any]:
         """Return what its file says beside the tensors, as plain values."""
         return {
             "format": FORMAT,
-            "limit": self.network.limit,
-            "activation": self.network.activation,
-            "output": self.network.output,
-            "encoding": self.encoding.to_dict(),
+            **{name: getattr(self.network, name) for name in ("limit", "activation", "output")},
+            "encoding": asdict(self.encoding),
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
             "safeguard": self.safeguard,
         }
 
     def save(self, path: Path) -> None:
-        """Write the policy and its card as one file, which replaces an old one atomically.
-
-        Raises:
-            OSError: It could not be written; an old file of that name is unchanged.
-        """
+        """Write the policy and its card as one file, which replaces an old one only as a whole."""
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), self.description())
 
     @classmethod
     def from_file(cls, path: str | Path) -> LearnedPolicy:
-        """Return the policy of a file.
-
-        Raises:
-            PolicyError: There is no such file, or it is damaged, truncated, or not a policy file.
-        """
+        """Return the policy of a file; PolicyError if there is none, or it is damaged or of another kind."""
         path = Path(path)
         tensors, text = _read(path)
         try:
@@ -205,18 +185,13 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             )
             adviser = description["adviser"]  # a scripted policy of this package: a file never names other code
             if adviser is not None and adviser not in SCRIPTED:
-                raise PolicyError(
-                    f"its adviser {adviser!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
-                )
-            if adviser is not None and description.get("correction") == "motion":
-                raise PolicyError("it corrects the actions of its adviser: install the version that wrote it")
-            encoding = Encoding.from_dict(description["encoding"])
+                raise PolicyError(f"{unknown('adviser', adviser, SCRIPTED)}: install the version that wrote it")
             return cls(
                 network,
-                encoding,
+                Encoding.from_dict(description["encoding"]),
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
-                bool(description.get("safeguard", False)),
+                bool(description["safeguard"]),
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
@@ -240,11 +215,9 @@ def _read(path: Path) -> tuple[dict[str, FloatArray], str]:
         raise PolicyError(f"there is no policy file {path}") from None
     except (SafetensorError, OSError, TypeError, ValueError) as error:
         raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error!s:.200}") from error
-    text = metadata.get(_KEY)
-    if text is None:
-        raise PolicyError(f"{path} is a safetensors file, but holds no policy of posse")
+    text = metadata.get(_KEY, "")
     if metadata.get("digest") != _digest(tensors, text):
-        raise PolicyError(f"{path} is damaged: its digest does not match its contents")
+        raise PolicyError(f"{path} holds no policy of posse, or a damaged one: its digest does not match its contents")
     return tensors, text
 
 

@@ -21,8 +21,8 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.policy import PlannerSettings, Search, actions_of_target
-from posse_baselines.policy import Annotations, Memory, check_fits, check_observations
+from posse_baselines.policies.planner import PlannerSettings, Search, actions_of_target
+from posse_baselines.policy import Annotations, BasePolicy, Memory
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
@@ -47,11 +47,7 @@ _SEEN: Final = record_type(
 
 @dataclass(frozen=True, kw_only=True)
 class BeliefSettings:
-    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata.
-
-    Raises:
-        ValueError: A number out of its range.
-    """
+    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata."""
 
     plan: PlannerSettings = field(default_factory=PlannerSettings)
     """How far it plays ahead, and what it tries."""
@@ -308,6 +304,10 @@ class _Memory(Minds):
         super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
         self.beliefs = Beliefs(plans, layout, num_worlds)
 
+    def restart(self, mask: BoolArray) -> None:
+        super().restart(mask)
+        self.beliefs.restart(np.repeat(mask, self.me.shape[1]))
+
 
 class BeliefPlanner(DDCS):
     """Model-predictive control in a world that each tracker keeps from what it observes and is told.
@@ -329,25 +329,19 @@ class BeliefPlanner(DDCS):
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        check_fits(self, layout)
+        BasePolicy.begin(self, layout, num_worlds)
         return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Reset the memory of the worlds of a mask (E,)."""
-        memory.beliefs.restart(np.repeat(mask, memory.me.shape[1]))
-        return super().restart(memory, mask)
 
     def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
         proposals, memory = super().propose(observations, memory, believes=believes)
         me, mates, team, beliefs = memory.me, memory.mates, memory.team, memory.beliefs
         shape = me.shape
-        observations = check_observations(self, observations, shape[0], memory.layout)
         plans = beliefs.search.teams.plans.reshape(mates.shape)
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
-        actions = beliefs.act(observations, self._working(memory)).reshape(*shape, 2)
+        actions = beliefs.act(np.asarray(observations, np.float32), self._working(memory)).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,15 +16,17 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray
 
-Shares = tuple[npt.ArrayLike, npt.ArrayLike]
-"""Speed, in [0, 1], and turn rate, in [-1, 1], of a target as shares of its greatest."""
-
-
-class Clock(NamedTuple):
-    """Memory: the control step in s, and the times (E,) in s since the start of each episode."""
-
-    step: float
-    times: FloatArray
+Clock = tuple[float, FloatArray]
+"""Memory: the control step in s, and the times (E,) in s since the start of each episode."""
+_MOTIONS: Final[dict[str, Callable[[FloatArray], tuple[npt.ArrayLike, npt.ArrayLike]]]] = {
+    "left-circle": lambda times: (1.0, 1.0),
+    "right-circle": lambda times: (1.0, -1.0),
+    "wide-circle": lambda times: (1.0, 0.5),
+    "stop-and-go": lambda times: ((times // 1.5) % 2.0, 0.0),
+    "spiral": lambda times: (1.0, 1.0 - times % 30.0 / 30.0),
+    "eight": lambda times: (1.0, np.where((times // 6.0) % 2.0 > 0.0, 1.0, -1.0)),
+}
+"""By name: times of the clock → speed, in [0, 1], and turn rate, in [-1, 1], of a target as shares of its greatest."""
 
 
 @dataclass(frozen=True)
@@ -34,57 +35,31 @@ class OpenLoop:
 
     Attributes:
         name: Its name.
-        motion: Times (E,) in s since the start of each episode → shares, (E,) each or the same for all.
     """
 
     name: str
-    motion: Callable[[FloatArray], Shares]
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Clock:
         """Return the clock at the start."""
-        return Clock(layout.scenario.control_step, np.zeros(num_worlds, np.float32))
+        return layout.scenario.control_step, np.zeros(num_worlds, np.float32)
 
     def act(self, observations: FloatArray, memory: Clock) -> tuple[FloatArray, Clock]:
         """Return the actions (E, 1, 2) at the times of the clock."""
+        step, times = memory
         actions = np.empty((len(observations), 1, 2), np.float32)
-        speed, turn = self.motion(memory.times)
+        speed, turn = _MOTIONS[self.name](times)
         actions[:, 0, 0], actions[:, 0, 1] = 2.0 * np.asarray(speed) - 1.0, turn
-        return actions, memory._replace(times=memory.times + np.float32(memory.step))
+        return actions, (step, times + np.float32(step))
 
     def restart(self, memory: Clock, mask: BoolArray) -> Clock:
         """Return the clock at the start in the worlds of a mask (E,)."""
-        return memory._replace(times=np.where(mask, np.float32(0.0), memory.times))
+        step, times = memory
+        return step, np.where(mask, np.float32(0.0), times)
 
     def arrays(self, memory: Clock) -> dict[str, npt.NDArray[Any]]:
         """Return the memory as arrays (E, ...) by name; views, not copies."""
-        return {"times": memory.times}
+        return {"times": memory[1]}
 
 
-def _circle(turn: float, _: FloatArray) -> Shares:
-    return 1.0, turn
-
-
-def _stop_and_go(times: FloatArray) -> Shares:
-    return (times // 1.5) % 2.0, 0.0
-
-
-def _spiral(times: FloatArray) -> Shares:
-    return 1.0, 1.0 - times % 30.0 / 30.0
-
-
-def _eight(times: FloatArray) -> Shares:
-    return 1.0, np.where((times // 6.0) % 2.0 > 0.0, 1.0, -1.0)
-
-
-OPEN_LOOP: Final = {
-    target.name: target
-    for target in (
-        OpenLoop("left-circle", partial(_circle, 1.0)),
-        OpenLoop("right-circle", partial(_circle, -1.0)),
-        OpenLoop("wide-circle", partial(_circle, 0.5)),
-        OpenLoop("stop-and-go", _stop_and_go),
-        OpenLoop("spiral", _spiral),
-        OpenLoop("eight", _eight),
-    )
-}
+OPEN_LOOP: Final = {name: OpenLoop(name) for name in _MOTIONS}
 """By name. The scenario's motion ``constant`` is the one that drives straight ahead."""

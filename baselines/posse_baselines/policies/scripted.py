@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from posse_baselines.ddcs import DDCS
@@ -18,8 +19,8 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,
     "idle": Idle,
     "pursuit": Pursuit,
-    **{name: (lambda name=name: DDCS.of(name)) for name in FAMILY},  # type: ignore[misc]
-    **{name: (lambda name=name: TunedDDCS(name)) for name in TUNED},  # type: ignore[misc]
+    **{name: partial(DDCS.of, name) for name in FAMILY},
+    **{name: partial(TunedDDCS.of, name) for name in TUNED},
     "belief-planner": BeliefPlanner,
     "planner": Planner,
 }
@@ -48,4 +49,4 @@ ABLATIONS: Final = (
     *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-l-l"),
     *("ddcs-centralized-no-exchange", "ddcs-no-radio"),
 )
-"""Policies that show what one part of another is good for; lists of names leave them out."""
+"""Policies that show what one part of another is good for; ``posse policies`` leaves them out."""

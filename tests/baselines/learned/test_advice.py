@@ -9,7 +9,7 @@ from tests.support.learned import network_for, policy_for
 import posse
 from posse_baselines import DDCS, PolicyError, load, play
 from posse_baselines.learned import Encoding, LearnedPolicy
-from posse_baselines.learned.advice import Advice, check_adviser
+from posse_baselines.safeguard import Advice, check_adviser
 
 SCRIPT = DDCS.of("ddcs-distributed")
 

@@ -133,11 +133,10 @@ LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, 
     ("changes", "message"),
     [
         ({"format": 2}, "its format is 2, this version reads 1"),
-        ({"adviser": "ddcs-distributed", "correction": "motion"}, "it corrects the actions of its adviser: install"),
         ({"limit": "wide"}, "damaged"),
         ({"limit": float("nan")}, "limit=nan"),
         ({"activation": "x" * 5000}, "unknown activation"),
-        ({"adviser": "os:system"}, "its adviser 'os:system' is none of"),
+        ({"adviser": "os:system"}, "unknown adviser 'os:system'"),
         ({"adviser": "planner"}, "cannot be an adviser"),
         ({"adviser": "ddcs-distributed"}, "the network takes"),
         ({"encoding": None}, "damaged"),
@@ -162,8 +161,8 @@ def test_descriptions_that_make_no_policy(
 
 
 def test_descriptions_that_lack_something_or_are_of_another_kind(tmp_path: Path, described: dict[str, Any]) -> None:
-    path, needed = tmp_path / "forged.safetensors", described.keys() - {"safeguard"}
-    lacking: list[Any] = [{k: v for k, v in described.items() if k != missing} for missing in needed]
+    path = tmp_path / "forged.safetensors"
+    lacking: list[Any] = [{k: v for k, v in described.items() if k != missing} for missing in described]
     for description in (*lacking, None, 3, "text", [[]]):
         write_policy_file(path, TENSORS, description)
         with pytest.raises(PolicyError, match="damaged"):

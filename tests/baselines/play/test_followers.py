@@ -48,7 +48,7 @@ def team(
 def arms(seen: list[Instant], robot: int, mate: int) -> npt.NDArray[np.complex128]:
     """A robot's control point as seen from a mate, m."""
     away = np.array([now.line_of_sight[0, mate] - now.line_of_sight[0, robot] for now in seen])
-    return away + OFFSET * np.exp(1j * np.array([now.tracker[0, robot, 2] for now in seen]))
+    return np.asarray(away + OFFSET * np.exp(1j * np.array([now.tracker[0, robot, 2] for now in seen])), np.complex128)
 
 
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004)])

@@ -89,7 +89,7 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
 
 def test_the_planner_reads_only_the_batch_it_watches() -> None:
     planner, other = load("planner"), posse.batch("smart", 3, num_trackers=3)
-    with pytest.raises(PolicyError, match=r"do not hold their state: show it the batch"):
+    with pytest.raises(PolicyError, match="watches none, not 3 of 'smart', whose state it reads: show it their batch"):
         planner.begin(other.layout, 3)
     begin(planner, posse.batch("constant", 2))
     with pytest.raises(PolicyError, match="watches 2 worlds of 'constant', not 3 of 'smart'"):

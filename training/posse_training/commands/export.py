@@ -13,9 +13,9 @@ import tyro
 
 from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.learned.advice import MOTION
 from posse_baselines.learned.features import NUM_FEATURES
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
+from posse_baselines.safeguard import MOTION
 from posse_training.errors import SettingsError, require
 
 _OPSET: Final = 13

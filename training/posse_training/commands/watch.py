@@ -64,7 +64,7 @@ def main(arguments: Sequence[str]) -> None:
     scenario = get_scenario(which.scenario, **which.overrides)
     target = None if which.target is None else load_target(which.target)
     if target is not None:
-        scenario = target.fit(scenario)
+        scenario = scenario.replace(target_motion=target.motion)
     policies = [load(name) for name in which.policies]
     world = {**which.place, "target": target}
     if which.out is not None:

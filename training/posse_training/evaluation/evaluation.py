@@ -122,7 +122,7 @@ def prepare(
     for player in (loaded, opponent):
         if player is not None:
             refuse_trained_split(player, split)
-    scenario = scenario if opponent is None else opponent.fit(scenario)
+    scenario = scenario if opponent is None else scenario.replace(target_motion=opponent.motion)
     scenario = scenario.replace(message_size=max(scenario.message_size, loaded.message_size))
     first, _ = next(blocks(scenario, range(1), 0, "train"))
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid

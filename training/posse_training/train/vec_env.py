@@ -20,8 +20,7 @@ from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines import Policy
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.learned.advice import MOTION, Advice, check_adviser
-from posse_baselines.safeguard import Guard
+from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
 from posse_training.train.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -42,7 +41,7 @@ class TeamVecEnv(VecEnv):
             team sizes may differ.
         encoding: Which inputs are read from an observation.
         adviser: Policy whose proposals are appended to the observations, and corrected by the
-            actions (2,) (:mod:`posse_baselines.learned.advice`).
+            actions (2,) (:class:`posse_baselines.safeguard.Advice`).
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`); an adviser has one of its own.
         see_state: Append the state of the world, for a centralized critic
@@ -205,7 +204,7 @@ class SlotGroup:
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         # What makes the robots' actions of the model's.
-        self._layer: Advice | Guard | None = Guard(batch.layout, worlds) if safeguard else None
+        self._layer = Guard(batch.layout, worlds) if safeguard else None
         if adviser:
             self._layer = Advice(adviser, batch.layout, worlds, believes=encoding.believes)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.

@@ -11,7 +11,7 @@ import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import check_adviser
+from posse_baselines.safeguard import check_adviser
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
@@ -51,7 +51,8 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
                 faced, argument = scenario.replace(target_motion="agent", message_size=size), "team_policy"
             else:
                 opponent = load_target(name)
-                faced, policy, argument = opponent.fit(scenario), opponent.policy, "target_policy"
+                faced, policy = scenario.replace(target_motion=opponent.motion), opponent.policy
+                argument = "target_policy"
             if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
                 raise PolicyError(
                     f"{name!r} cannot be trained against: it reads the state of the worlds, or its memory cannot be "

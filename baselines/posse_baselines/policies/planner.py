@@ -11,8 +11,8 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.law import PLAN_AT_START, WAY, Teams, drive, teams_of
-from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations
+from posse_baselines.policies.planner_law import PLAN_AT_START, WAY, Teams, drive, teams_of
+from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
 _STANDARD: Final = np.array(
@@ -37,16 +37,12 @@ _REPEAT: Final = 64  # plannings after which the variations repeat
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerSettings:
-    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata.
-
-    Raises:
-        ValueError: A number out of its range.
-    """
+    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata."""
 
     look_ahead: float = number(4.0, "s", 0.1, 20.0)
     """How far each try is played ahead."""
     keep: float = number(0.5, "s", 0.01, 20.0)
-    """How long the best is kept before the next planning; no longer than ``look_ahead``."""
+    """How long the best is kept before the next planning."""
     rounds: int = number(2, "", 0, 20)
     """Rounds of variations on the best so far, after the standard ways of playing."""
     varied: float = number(0.5, "", 0.0, 1.0)
@@ -60,11 +56,6 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         check(self)
-        if self.keep > self.look_ahead:
-            raise ValueError(
-                f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "
-                "after it was not played ahead"
-            )
 
 
 class Search(OwnArrays):
@@ -227,31 +218,20 @@ class Planner(BasePolicy):
         self._batch = batch
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the batch that is being watched.
-
-        Raises:
-            PolicyError: No batch was shown to it, or one of another scenario or size.
-        """
-        check_fits(self, layout)
+        """Return the memory for the batch that is watched; PolicyError if there is none, or it is another one."""
+        super().begin(layout, num_worlds)
         batch = self._batch
-        if batch is None:
+        if batch is None or batch.num_worlds != num_worlds or batch.scenario != layout.scenario:
+            watched = "none" if batch is None else f"{batch.num_worlds} worlds of {batch.scenario.name!r}"
             raise PolicyError(
-                "policy 'planner' plays ahead in copies of the worlds, and observations do not "
-                "hold their state: show it the batch with watch(batch), or use "
-                "posse_baselines.begin(policy, batch)"
-            )
-        if batch.num_worlds != num_worlds or batch.scenario != layout.scenario:
-            raise PolicyError(
-                f"policy 'planner' watches {batch.num_worlds} worlds of {batch.scenario.name!r}, "
-                f"not {num_worlds} of {layout.scenario.name!r}: call watch(batch) before begin()"
+                f"policy 'planner' watches {watched}, not {num_worlds} of {layout.scenario.name!r}, whose state it "
+                "reads: show it their batch with watch(batch), or use posse_baselines.begin(policy, batch)"
             )
         return Search(self.settings, batch)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions for the state that the watched batch is in; observations are not read."""
-        search: Search = memory
-        check_observations(self, observations, search.batch.num_worlds, search.batch.layout)
-        return search.actions(), search
+        return memory.actions(), memory
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Forget the plans of the worlds of a mask (E,)."""

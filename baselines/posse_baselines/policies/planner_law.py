@@ -236,15 +236,6 @@ def frame_rate_of(c: Record, w: Record) -> float:
 
 
 @compiled
-def read_motion(c: Record, t: Record, me: Record) -> None:
-    """Take a tracker's motion and limits into its plan."""
-    me.heading, me.speed, me.omega = complex(t.heading_cos, t.heading_sin), t.speed, t.turn_rate
-    me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
-    me.acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else UNLIMITED
-    me.turn_acceleration = 1.0 / c.per_turn_acceleration if c.per_turn_acceleration > 0.0 else UNLIMITED
-
-
-@compiled
 def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
     c, w, target = scene.config, scene.world, scene.plans[0]
@@ -257,7 +248,10 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
-        read_motion(c, t, me)
+        me.heading, me.speed, me.omega = complex(t.heading_cos, t.heading_sin), t.speed, t.turn_rate
+        me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
+        me.acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else UNLIMITED
+        me.turn_acceleration = 1.0 / c.per_turn_acceleration if c.per_turn_acceleration > 0.0 else UNLIMITED
         velocity = wanted_velocity(scene, i, me.acceleration)
         discs = work.discs[: surround(scene, i, work.discs)]
         me.wish, _ = safe_velocity(me, discs, velocity)
