@@ -39,9 +39,9 @@ _ROUNDS: Final = 6
 
 
 @compiled
-def when_observed(me: Record, place: complex, velocity: complex) -> complex:
+def when_observed(team: Team, me: Record, place: complex, velocity: complex) -> complex:
     """Return the way to what is ``place`` (m) off when the command is executed, as it was when the sonar measured."""
-    way: complex = place - scaled(velocity, me.lead) + me.moved
+    way: complex = place - scaled(velocity, team.world.lead) + me.moved
     return way
 
 
@@ -51,7 +51,7 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
     world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(len(robots)):
-        place = when_observed(me, robots[j].place, robots[j].velocity)
+        place = when_observed(team, me, robots[j].place, robots[j].velocity)
         square = dot(place, place)
         if square > reach * reach:
             continue
@@ -78,7 +78,7 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     for k in range(len(team.slots)):
         arm = team.slots[k] * me.frame
         velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
-        way = when_observed(me, me.target + arm - me.position, velocity)
+        way = when_observed(team, me, me.target + arm - me.position, velocity)
         distance = length(way)
         fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
         if fits and dot(way, beam) >= team.world.wide_beam * distance:
@@ -95,7 +95,6 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         # In a chase the target is not avoided: the law ends the chase in time.
         reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
         count = put_near(discs, count, me.target - me.position, me.target_velocity, reach, margin)
-    few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
         age = silence(team, me, mate)
@@ -104,12 +103,12 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         position, velocity = mate_now(team, me, mate)
         way = position - me.position
         # If it were still there after a silence, it would have a place in the observation.
-        if not (few and age > patience(team, me) and length(way) < me.horizon):
+        if not (world.unlisted and age > patience(team, me) and length(way) < me.horizon):
             margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
             count = put_near(discs, count, way, velocity, two, margin)
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
-    strangers = me.known != 0 and few
+    strangers = me.known != 0 and world.unlisted != 0
     if not strangers or is_due(team, me, _TAKEN_TIME):
         me.taken = np.uint64(0)
     heading = me.heading * me.turned.conjugate()
@@ -188,7 +187,7 @@ def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
 def foresee(team: Team, me: Record) -> None:
     """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
     delay, dt = int(team.world.delay), float(team.world.dt)
-    me.lead, me.moved, me.turned = 0.0, 0j, 1.0 + 0j
+    me.moved, me.turned = 0j, 1.0 + 0j
     if delay == 0:
         return
     start = me.heading
@@ -204,12 +203,11 @@ def foresee(team: Team, me: Record) -> None:
         me.moved += scaled(me.heading * vector(1.0, 0.5 * turn), mean * dt)
         me.heading *= vector(1.0, turn)
     me.turned = me.heading * start.conjugate()
-    me.lead = delay * dt
     me.position += me.moved
     if me.known:
-        me.target, me.target_theta = target_after(team, me, me.fix_age + me.lead)
+        me.target, me.target_theta = target_after(team, me, me.fix_age + team.world.lead)
         me.target_velocity = vector(me.target_speed, me.target_theta)
-        me.frame *= vector(1.0, me.psi_rate * me.lead)
+        me.frame *= vector(1.0, me.psi_rate * team.world.lead)
 
 
 @compiled

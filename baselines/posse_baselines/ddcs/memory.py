@@ -9,6 +9,7 @@ constants of their scenario, are converted once, to a unit of :func:`unit_of` me
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
@@ -31,7 +32,7 @@ from posse.numeric import (
 )
 from posse.rules import beam_directions
 from posse.scenarios.setting import OPEN_PLANE_EXTENT
-from posse_baselines.ddcs.settings import Settings, settings_record
+from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.safeguard import DISC
 from posse_baselines.laws.steering import WORK_ROWS
@@ -60,37 +61,6 @@ _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 
-OFFSETS: Final = record_type(
-    *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
-    ("neighbours", np.int32),  # places for team-mates
-    ("stride", np.int32),  # length of one team-mate's part
-    ("sonar_beams", np.int32),
-    ("message_size", np.int32),
-)
-"""Offsets of the fields of a layout.
-
-A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
-"""
-
-CONSTANTS: Final = record_type(
-    ("dt", np.float32),  # control step, s
-    ("delay", np.int32),  # control steps after which a command is executed
-    ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
-    ("sonar_range", np.float32),  # reading that means "nothing near", m
-    ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
-    ("radius", np.float32),  # of a robot's disc, m
-    ("walled", np.int32),
-    ("half_width", np.float32),  # of the arena, m
-    ("half_height", np.float32),
-    ("sight", np.float32),  # how far its target sensor reaches, m
-    ("searches", np.int32),  # 1: it may have to be searched for
-    ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
-    ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
-    ("area_y", np.float32),  # half its height
-    ("outermost", np.float64),  # distance of the outermost slot from the target, m
-)
-"""Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
-
 
 def unit_of(scenario: Scenario) -> float:
     """Return the length (m) that the robots of a scenario take for a metre: 1 at a radius of 0.15 m."""
@@ -110,47 +80,82 @@ def in_units(layout: ObservationLayout, observations: FloatArray) -> FloatArray:
     return converted
 
 
+def _record(values: dict[str, Any]) -> Records:
+    """Return an array of one record that has these values, in their types."""
+    arrays = {name: np.asarray(value) for name, value in values.items()}
+    record = np.zeros(1, record_type(*((name, array.dtype, array.shape) for name, array in arrays.items())))
+    for name, array in arrays.items():
+        record[name] = array
+    return record
+
+
 def offsets_of(layout: ObservationLayout) -> Records:
-    """Return an array of one :data:`OFFSETS`."""
-    record, scenario = np.zeros(1, OFFSETS), layout.scenario
-    for name in _FIELDS:
-        record[name] = layout.offsets.get(name, -1)
-    record["neighbours"], record["stride"] = layout.neighbours, layout.stride
-    record["sonar_beams"] = scenario.sonar_beams
-    record["message_size"] = scenario.message_size
-    return record
+    """Return where a layout has its fields, as an array of one record; -1: it has no such field.
+
+    A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
+    """
+    at = {name: layout.offsets.get(name, -1) for name in _FIELDS}
+    at |= {"neighbours": layout.neighbours, "stride": layout.stride}
+    at |= {name: getattr(layout.scenario, name) for name in ("sonar_beams", "message_size")}
+    return _record({name: _I(value) for name, value in at.items()})
 
 
-def constants_of(scenario: Scenario) -> Records:
-    """Return an array of one :data:`CONSTANTS`."""
-    record, unit = np.zeros(1, CONSTANTS), unit_of(scenario)
-    record["dt"] = scenario.control_step
-    lag = scenario.actuator_lag
-    record["delay"], record["followed"] = scenario.command_delay, 1.0
-    if lag > 0:
-        record["followed"] = 1 - math.exp(-scenario.control_step / lag)
-    record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
-    record["sonar_range"] = scenario.sonar_range / unit
-    record["radius"] = scenario.robot_radius / unit
-    record["sight"] = min(scenario.sensing_range / unit, _MOST_SIGHT)
+def constants_of(scenario: Scenario, settings: Settings) -> Records:
+    """Return what is constant of robots and arena, as an array of one record; a metre is a unit of :func:`unit_of`."""
+    unit, dt, lag = unit_of(scenario), _F(scenario.control_step), scenario.actuator_lag
+    foreseen = settings.foresight > 0.0 and scenario.command_delay <= _MOST_WAITING
+    delay = scenario.command_delay if foreseen else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
-    record["half_width"], record["half_height"] = half_width, half_height
-    record["area_x"], record["area_y"] = min(half_width, _OPEN_AREA), min(half_height, _OPEN_AREA)
-    record["searches"] = math.isfinite(scenario.sensing_range)
-    record["drifts"] = scenario.drifts
-    record["walled"] = scenario.walled
-    return record
+    return _record(
+        {
+            "dt": dt,  # control step, s
+            "delay": _I(delay),  # control steps after which a command is executed
+            "lead": delay * float(dt),  # the same in s: how far decisions are ahead of the observation
+            # share of a wanted change of the motion that a step brings; 1: no lag
+            "followed": 1 - math.exp(-scenario.control_step / lag) if lag > 0 else 1.0,
+            "sonar_range": _F(scenario.sonar_range / unit),  # reading that means "nothing near", m
+            # cosine of a little more than half a beam's width
+            "wide_beam": _F(math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))),
+            "radius": _F(scenario.robot_radius / unit),  # of a robot's disc, m
+            "walled": _I(scenario.walled),
+            "half_width": _F(half_width),  # of the arena, m
+            "half_height": _F(half_height),
+            "sight": _F(min(scenario.sensing_range / unit, _MOST_SIGHT)),  # how far its target sensor reaches, m
+            "searches": _I(math.isfinite(scenario.sensing_range)),  # 1: it may have to be searched for
+            "unlisted": _I(scenario.neighbours < scenario.num_trackers - 1),  # 1: an observation has no place for some
+            "drifts": _I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
+            "area_x": _F(min(half_width, _OPEN_AREA)),  # half the width of the rectangle that is to be searched, m
+            "area_y": _F(min(half_height, _OPEN_AREA)),  # half its height
+            "outermost": max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m
+        }
+    )
+
+
+def settings_of(settings: Settings) -> Records:
+    """Return settings as an array of one record.
+
+    A choice is its position among those allowed, ``forbidden`` a table of the transitions from a task (row) to another.
+    """
+    values: dict[str, Any] = {"forbidden": np.zeros((len(TASKS), len(TASKS)), np.int64)}
+    for transition in settings.forbidden:
+        before, after = transition.split(">")
+        values["forbidden"][TASKS.index(before), TASKS.index(after)] = 1
+    for field in dataclasses.fields(settings):
+        value, choices = getattr(settings, field.name), field.metadata.get("choices")
+        if field.name != "forbidden":
+            values[field.name] = choices.index(value) if choices else float(value)
+    return _record(values)
 
 
 class Team(NamedTuple):
     """What the trackers of a team have in common."""
 
     at: Record
-    """:data:`OFFSETS`: where each field is in an observation."""
+    """:func:`offsets_of`: where each field is in an observation."""
     world: Record
-    """:data:`CONSTANTS`: robots and arena."""
+    """:func:`constants_of`: robots and arena."""
     settings: Record
-    """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
+    """:func:`settings_of`."""
     slots: npt.NDArray[np.complex64]
     """(N,) place of each slot in the slot frame, m."""
     beams: npt.NDArray[np.complex64]
@@ -162,14 +167,10 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     scenario = layout.scenario
     slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
-    world = constants_of(scenario)
-    world["outermost"] = max(map(abs, slots))
-    if settings.foresight == 0.0 or scenario.command_delay > _MOST_WAITING:
-        world["delay"] = 0
     return Team(
         offsets_of(layout),
-        world,
-        settings_record(settings),
+        constants_of(scenario, settings),
+        settings_of(settings),
         np.array(slots, np.complex64),
         (cosines + 1j * sines).astype(np.complex64),
     )
@@ -246,8 +247,7 @@ MIND, MIND_AT_START = _fields(
     ("wish_omega", np.float64, 0),
     # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
     ("waiting", (np.complex128, (_MOST_WAITING,)), 0),
-    ("lead", np.float64, 0),  # s; how far position, heading and target are ahead of the observation
-    ("moved", np.complex128, 0),  # by then, m
+    ("moved", np.complex128, 0),  # from the observation to the execution of the command, m
     ("turned", np.complex128, 1),  # by then, as a rotation
     # leadership
     ("leader", _I, -1),  # -1: none yet
@@ -267,7 +267,7 @@ MIND, MIND_AT_START = _fields(
 
 MATE, MATE_AT_START = _fields(
     ("step", _I, -1),  # own step at which it sent what follows; -1: never heard
-    ("fresh", _I, 0),  # 1: heard in this step
+    ("heard", _I, -1),  # own step at which it was heard last
     ("position", _C, 0),
     ("velocity", _C, 0),
     ("heading", _C, 0),

@@ -185,8 +185,6 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
 def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
     """Update the table of team-mates (N,) with an observation (F,)."""
     at, settings, dt = team.at, team.settings, team.world.dt
-    for j in range(len(mates)):
-        mates[j].fresh = 0
     me.usual_gap -= me.usual_gap * min(1.0, dt / _GAP_MEMORY)
     if not settings.radio:
         return
@@ -207,7 +205,7 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
             gap = float((sent - mate.step) * dt + age)
             if gap < settings.lost_after:
                 me.usual_gap = max(me.usual_gap, gap)
-        mate.step, mate.fresh = sent, 1
+        mate.step, mate.heard = sent, me.step
         mate.position = me.position + scaled(pair(row, at.neighbour_bearing + k) * me.heading, away)
         heading = pair(row, at.neighbour_heading + k) * me.heading
         mate.heading, mate.velocity = heading, scaled(heading, row[at.neighbour_speed + k])
@@ -238,8 +236,7 @@ def is_there(team: Team, me: Record, mate: Record) -> bool:
     """Return whether a tracker is another one (nothing is heard of oneself) that counts as working and in range."""
     if mate.step < 0:
         return False
-    all_listed = team.at.neighbours >= len(team.slots) - 1
-    return silence(team, me, mate) <= (patience(team, me) if all_listed else _UNSEEN_MEMORY)
+    return silence(team, me, mate) <= (_UNSEEN_MEMORY if team.world.unlisted else patience(team, me))
 
 
 @compiled
@@ -258,4 +255,4 @@ def mate_now(team: Team, me: Record, mate: Record) -> tuple[complex, complex]:
     age = silence(team, me, mate)
     if age > patience(team, me):
         return mate.position, 0j
-    return mate.position + scaled(mate.velocity, age + me.lead), mate.velocity
+    return mate.position + scaled(mate.velocity, age + team.world.lead), mate.velocity

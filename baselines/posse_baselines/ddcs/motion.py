@@ -218,7 +218,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
     speed, rate = 0.0, 0.0
     if age <= patience(team, me):
         speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
-        theta = wrap(theta + rate * (age + me.lead))
+        theta = wrap(theta + rate * (age + team.world.lead))
     frame = theta
     if team.settings.follower_frame == BY_SLOT_FRAME:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
@@ -321,8 +321,7 @@ def begin_search(team: Team, me: Record) -> None:
     me.lost_step, me.goal_step = me.step, -1
     if team.world.walled == 0 and me.fix_step >= 0:
         me.area = me.target
-        for k in range(GRID * GRID):
-            me.seen[k] = 0
+        me.seen[:] = 0
 
 
 @compiled

@@ -41,9 +41,7 @@ _BIT: Final = np.uint64(1)
 
 @compiled
 def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool:
-    """Return whether a claim (term, leader) wins over another; -1 is no leader."""
-    if leader < 0:
-        return False
+    """Return whether a claim (term, leader) wins over another, whose leader may be -1: none."""
     if old_leader < 0 or is_newer(term, old_term):
         return True
     return term == old_term and leader < old_leader
@@ -66,11 +64,11 @@ def position_of(team: Team, me: Record, mates: Records, j: int) -> complex:
 
 
 @compiled
-def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tuple[int, float]:
-    """Return the working tracker other than ``barred`` (-1: any) that is nearest to the target, and its distance."""
+def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]:
+    """Return the working tracker that is nearest to the target, another one than the leader or itself; its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
-        if j != barred and is_there(team, me, mates[j]):
+        if j != me.leader and is_there(team, me, mates[j]):
             distance = length(me.target - position_of(team, me, mates, j))
             if distance < least:
                 best, least = j, distance
@@ -94,16 +92,16 @@ def central_tracker(team: Team, me: Record, mates: Records) -> int:
 
 
 @compiled
-def select_leader(team: Team, me: Record, mates: Records, barred: int) -> None:
-    """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
+def select_leader(team: Team, me: Record, mates: Records) -> None:
+    """Appoint a tracker other than the leader under a new term."""
     best, term = int(me.number), me.term + 1
     if me.known:
-        best, _ = nearest_tracker(team, me, mates, barred)
+        best, _ = nearest_tracker(team, me, mates)
     elif others_there(team, me, mates) == 0:
         term = me.term - 1
     else:
         central = central_tracker(team, me, mates)
-        best = central if central != barred else best
+        best = central if central != me.leader else best
     appoint(me, best, term % COUNT, 0)
 
 
@@ -113,7 +111,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     settings, dt = team.settings, team.world.dt
     for j in range(len(mates)):
         mate = mates[j]
-        if mate.fresh == 0 or mate.leader < 0:
+        if mate.heard != me.step or mate.leader < 0:
             continue
         if mate.leader == me.leader and mate.term == me.term:
             if is_newer(mate.pulse, me.pulse):
@@ -123,18 +121,18 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     if me.leader == me.number:
         me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1
     if me.leader < 0:
-        select_leader(team, me, mates, -1)
+        select_leader(team, me, mates)
         return
     # In the search there are no followers, and leadership changes without the exchange task.
     if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
         return
     if me.leader == me.number:
         if me.known and is_due(team, me, settings.time_lag):
-            best, least = nearest_tracker(team, me, mates, -1)
+            best, least = nearest_tracker(team, me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
     elif (me.step - me.pulse_step) * dt > patience(team, me) + settings.lead_patience:
-        select_leader(team, me, mates, me.leader)
+        select_leader(team, me, mates)
 
 
 @compiled
@@ -169,7 +167,7 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     for j in range(n):
         mate = mates[j]
         there = j == me.number or is_there(team, me, mate)
-        if not there and (team.at.neighbours >= n - 1 or mate.slot < 0):
+        if not there and (team.world.unlisted == 0 or mate.slot < 0):
             continue
         if not there:
             # It has no place in the observation but claimed a slot. If it were still near its
