@@ -25,11 +25,11 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import Team, Work, is_due
+from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
-from posse_baselines.laws.steering import Course, assign, time_to_slot
+from posse_baselines.laws.steering import Course, Work, assign, time_to_slot
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
@@ -69,7 +69,7 @@ def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
         if j != me.leader and is_there(team, me, mates[j]):
-            distance = length(me.target - position_of(team, me, mates, j))
+            distance = length(me.target - mate_now(team, me, mates[j])[0])
             if distance < least:
                 best, least = j, distance
     return best, least
@@ -108,7 +108,7 @@ def select_leader(team: Team, me: Record, mates: Records) -> None:
 @compiled
 def settle_lead(team: Team, me: Record, mates: Records) -> None:
     """Process received claims; hand over or appoint if due."""
-    settings, dt = team.settings, team.world.dt
+    settings = team.settings
     for j in range(len(mates)):
         mate = mates[j]
         if mate.heard != me.step or mate.leader < 0:
@@ -131,7 +131,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
             best, least = nearest_tracker(team, me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
-    elif (me.step - me.pulse_step) * dt > patience(team, me) + settings.lead_patience:
+    elif since(team, me, me.pulse_step) > patience(team, me) + settings.lead_patience:
         select_leader(team, me, mates)
 
 
@@ -193,24 +193,24 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             cost[j, k] = time + 1e-4 * j
     assign(cost, work.assigning)
     slot = int(work.assigning[0, me.number])
-    if me.slot == slot and has_precedence(team, me, mates, slot):
+    if me.slot == slot and has_precedence(team, me, mates):
         cost[me.number, slot] = _RESERVED
         assign(cost, work.assigning)
     me.slot = int(work.assigning[0, me.number])
 
 
 @compiled
-def has_precedence(team: Team, me: Record, mates: Records, slot: int) -> bool:
-    """Return whether a team-mate that claims a slot has precedence over this tracker.
+def has_precedence(team: Team, me: Record, mates: Records) -> bool:
+    """Return whether a team-mate that claims the own slot has precedence over this tracker.
 
     The nearer one has; for equal distances the lower number. Both trackers get the same result,
     whatever else they know.
     """
-    place = me.target + team.slots[slot] * me.frame
+    place = me.target + team.slots[me.slot] * me.frame
     mine = length(place - me.position)
     for j in range(len(mates)):
-        if mates[j].slot == slot and is_there(team, me, mates[j]):
-            other = length(place - position_of(team, me, mates, j))
+        if mates[j].slot == me.slot and is_there(team, me, mates[j]):
+            other = length(place - mate_now(team, me, mates[j])[0])
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
                 return True
     return False

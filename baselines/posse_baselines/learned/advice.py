@@ -17,7 +17,7 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs import DDCS
-from posse_baselines.ddcs.belief import BELIEF_SIZE
+from posse_baselines.learned.belief import BELIEF_SIZE, beliefs_of
 from posse_baselines.policy import Policy, PolicyError
 
 REACH: Final = np.float32(2.0)
@@ -67,7 +67,9 @@ class Advice(OwnArrays):
         """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
         kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
         self._asked[...] = observations
-        self.inputs[...], self.memory = self._adviser.propose(observations, self.memory, believes=self._believes)
+        self.inputs[..., :MOTION], self.memory = self._adviser.propose(self._asked, self.memory)
+        if self._believes:
+            self.inputs[..., MOTION:] = beliefs_of(self.memory, self._asked)
         for name, array in self.arrays().items():
             if mask is not None:
                 array[~mask] = kept[name]

@@ -12,9 +12,8 @@ import pytest
 import posse
 from posse_baselines import begin, load
 from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
-from posse_baselines.ddcs.actuation import turn_past
-from posse_baselines.ddcs.belief import BELIEF
-from posse_baselines.laws.safeguard import DISC, put_disc
+from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
+from posse_baselines.learned.belief import BELIEF, beliefs_of
 
 
 @pytest.mark.parametrize(
@@ -93,8 +92,8 @@ def way(soft: Complexes, scale: float) -> Complexes:
     return np.asarray(soft * scale / (1.0 - np.abs(soft)))
 
 
-def beliefs(proposals: npt.NDArray[np.float32]) -> npt.NDArray[Any]:
-    return np.ascontiguousarray(proposals[..., 2:]).view(BELIEF)[..., 0]
+def beliefs(memory: Any, observations: npt.NDArray[np.float32]) -> npt.NDArray[Any]:
+    return np.ascontiguousarray(beliefs_of(memory, observations)).view(BELIEF)[..., 0]
 
 
 def test_the_belief_of_a_team_in_formation_is_correct() -> None:
@@ -102,9 +101,9 @@ def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     for _ in range(250):
-        proposals, memory = ddcs.propose(observations, memory, believes=True)
-        belief, state = beliefs(proposals), {k: v.copy() for k, v in batch.state.items()}
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
+        proposals, memory = ddcs.propose(observations, memory)
+        belief, state = beliefs(memory, observations), {k: v.copy() for k, v in batch.state.items()}
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
         observations = batch.step(actions)[0]
     assert belief.shape == (8, 5)
     x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
@@ -133,14 +132,14 @@ def test_a_searcher_has_no_estimate_of_the_target() -> None:
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     lost = []
     for _ in range(20):
-        proposals, memory = ddcs.propose(observations, memory, believes=True)
-        belief = beliefs(proposals)
+        proposals, memory = ddcs.propose(observations, memory)
+        belief = beliefs(memory, observations)
         searching = belief["task"][..., SEARCHING] == 1.0
         assert searching.any()
         for name in ("known", "target", "target_velocity", "frame", "frame_rate", "age", "has_slot", "slot_near"):
             assert not belief[name][searching].any()
         lost.append(belief["lost"][searching].max())
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
         observations = batch.step(actions)[0]
     np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)
 
