@@ -25,7 +25,7 @@ from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import guard_all
-from posse_baselines.ddcs.belief import BELIEF_SIZE
+from posse_baselines.ddcs.belief import BELIEF_SIZE, beliefs_of
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import Policy, PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
@@ -119,7 +119,9 @@ class Advice(Guard):
         """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
         kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
         super().follow(observations)
-        self.inputs[...], _ = self._adviser.propose(observations, self.minds, believes=self._believes)
+        self.inputs[..., :MOTION], _ = self._adviser.propose(self._observed, self.minds)
+        if self._believes:
+            self.inputs[..., MOTION:] = beliefs_of(self.minds, self._observed)
         for name, array in self.arrays().items():
             if mask is not None:
                 array[~mask] = kept[name]

@@ -15,6 +15,7 @@ from tests.support.process import run_tests_elsewhere
 from posse.numeric import FloatArray
 from posse_baselines import load
 from posse_baselines.ddcs import DDCS
+from posse_baselines.ddcs.belief import beliefs_of
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
@@ -81,7 +82,8 @@ def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path)
     script = DDCS()
     batch, observations = observations_of("smart", message_size=script.message_size)
     encoding = Encoding.of(batch.layout, "belief")
-    further, memory = script.propose(observations, script.begin(batch.layout, 6), believes=True)
+    proposals, memory = script.propose(observations, script.begin(batch.layout, 6))
+    further = np.concatenate([proposals, beliefs_of(memory, observations)], axis=-1)
     policy = LearnedPolicy(network_for(encoding.size + further.shape[-1]), encoding, {}, load("ddcs-distributed"))
     wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
     encoded = Encoder(encoding, batch.layout).encode(observations)

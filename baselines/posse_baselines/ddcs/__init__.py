@@ -15,7 +15,7 @@ PNGL + l-φ.
 
 from __future__ import annotations
 
-from posse_baselines.ddcs.policy import DDCS
+from posse_baselines.ddcs.baseline import DDCS
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING, TASKS, Settings
 
 __all__ = ["CONVERGING", "DDCS", "EXCHANGING", "FLOCKING", "SEARCHING", "TASKS", "Settings"]

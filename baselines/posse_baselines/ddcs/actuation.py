@@ -17,11 +17,21 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import Team, is_due
-from posse_baselines.ddcs.monitoring import mate_now, patience, silence, target_after
-from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, unit, vector
+from posse_baselines.ddcs.memory import Team, is_due, since
+from posse_baselines.ddcs.monitoring import mate_now, patience, target_after
+from posse_baselines.laws.geometry import clip, cross, dot, length, scaled, unit, vector
 from posse_baselines.laws.guidance import regulate, write_motion
-from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_near, put_walls, safe_velocity, to_wall
+from posse_baselines.laws.safeguard import (
+    MOST_TURN,
+    NEAR,
+    WALLS,
+    put_disc,
+    put_near,
+    put_walls,
+    safe_velocity,
+    to_wall,
+    turn_past,
+)
 from posse_baselines.laws.steering import slot_velocity
 
 _SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
@@ -30,18 +40,15 @@ _TAKEN_TIME: Final = 3.0  # s; longest time for which a slot counts as taken aft
 _MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
 _FORGOTTEN: Final = 30.0  # s; silence after which a team-mate is no longer assumed at its last position
 _SIDE_KEPT: Final = 1.5  # s
-_LARGEST: Final = 2.0  # m; reach of a disc; walls are larger
-_MOST_TURN: Final = 2.0  # rad; farther round is no way past
-_ROUNDS: Final = 6
 
 
 # --- surroundings --------------------------------------------------------------------------------
 
 
 @compiled
-def when_observed(me: Record, place: complex, velocity: complex) -> complex:
+def when_observed(team: Team, me: Record, place: complex, velocity: complex) -> complex:
     """Return the way to what is ``place`` (m) off when the command is executed, as it was when the sonar measured."""
-    way: complex = place - scaled(velocity, me.lead) + me.moved
+    way: complex = place - scaled(velocity, team.world.lead) + me.moved
     return way
 
 
@@ -51,7 +58,7 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
     world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(len(robots)):
-        place = when_observed(me, robots[j].place, robots[j].velocity)
+        place = when_observed(team, me, robots[j].place, robots[j].velocity)
         square = dot(place, place)
         if square > reach * reach:
             continue
@@ -78,7 +85,7 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     for k in range(len(team.slots)):
         arm = team.slots[k] * me.frame
         velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
-        way = when_observed(me, me.target + arm - me.position, velocity)
+        way = when_observed(team, me, me.target + arm - me.position, velocity)
         distance = length(way)
         fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
         if fits and dot(way, beam) >= team.world.wide_beam * distance:
@@ -95,21 +102,20 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         # In a chase the target is not avoided: the law ends the chase in time.
         reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
         count = put_near(discs, count, me.target - me.position, me.target_velocity, reach, margin)
-    few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
-        age = silence(team, me, mate)
+        age = since(team, me, mate.step)
         if mate.step < 0 or age > _FORGOTTEN:
             continue
         position, velocity = mate_now(team, me, mate)
         way = position - me.position
         # If it were still there after a silence, it would have a place in the observation.
-        if not (few and age > patience(team, me) and length(way) < me.horizon):
+        if not (world.unlisted and age > patience(team, me) and length(way) < me.horizon):
             margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
             count = put_near(discs, count, way, velocity, two, margin)
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
-    strangers = me.known != 0 and few
+    strangers = me.known != 0 and world.unlisted != 0
     if not strangers or is_due(team, me, _TAKEN_TIME):
         me.taken = np.uint64(0)
     heading = me.heading * me.turned.conjugate()
@@ -136,46 +142,18 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
 
 
 @compiled
-def turn_past(discs: Records, clearance: float, wanted: complex, side: float) -> float:
-    """Return the turn (rad, left positive) from a unit vector to a clear direction on a side (1: left, -1: right).
-
-    Standing discs are in the way, not walls. ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
-    """
-    turn, ahead = 0.0, wanted
-    for _ in range(_ROUNDS):
-        least, nearest = 1e9, -1
-        for k in range(len(discs)):
-            disc = discs[k]
-            if disc.velocity != 0j or disc.reach > _LARGEST or dot(disc.place, ahead) <= 0.0:
-                continue
-            # A little less than the tangent's clearance, or the tangent itself would be blocked.
-            if abs(cross(disc.place, ahead)) < 0.98 * (disc.reach + clearance) and length(disc.place) < least:
-                least, nearest = length(disc.place), k
-        if nearest < 0:
-            return turn
-        disc = discs[nearest]
-        half = math.asin(min(1.0, (disc.reach + clearance) / max(least, 1e-6)))
-        # From the wanted direction to the disc's centre, then to its edge.
-        turn = angle_of(disc.place * wanted.conjugate()) + side * half
-        if abs(turn) > _MOST_TURN:
-            return 2.0 * _MOST_TURN
-        ahead = wanted * vector(1.0, turn)
-    return 2.0 * _MOST_TURN
-
-
-@compiled
 def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
     """Return the wanted velocity (m/s), turned past what stands in its way."""
     ahead, clearance = unit(wanted), team.settings.detour
     left, right = turn_past(discs, clearance, ahead, 1.0), turn_past(discs, clearance, ahead, -1.0)
     if left == 0.0 and right == 0.0:
         return wanted
-    kept = me.side if (me.step - me.side_step) * team.world.dt <= _SIDE_KEPT else 0
+    kept = me.side if since(team, me, me.side_step) <= _SIDE_KEPT else 0
     goes_left = abs(left) < abs(right)
-    if kept != 0 and abs(left if kept > 0 else right) <= _MOST_TURN:
+    if kept != 0 and abs(left if kept > 0 else right) <= MOST_TURN:
         goes_left = kept > 0
     turn = left if goes_left else right
-    if abs(turn) > _MOST_TURN:
+    if abs(turn) > MOST_TURN:
         return wanted
     me.side, me.side_step = 1 if goes_left else -1, me.step
     return wanted * vector(1.0, turn)
@@ -188,7 +166,7 @@ def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
 def foresee(team: Team, me: Record) -> None:
     """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
     delay, dt = int(team.world.delay), float(team.world.dt)
-    me.lead, me.moved, me.turned = 0.0, 0j, 1.0 + 0j
+    me.moved, me.turned = 0j, 1.0 + 0j
     if delay == 0:
         return
     start = me.heading
@@ -204,12 +182,11 @@ def foresee(team: Team, me: Record) -> None:
         me.moved += scaled(me.heading * vector(1.0, 0.5 * turn), mean * dt)
         me.heading *= vector(1.0, turn)
     me.turned = me.heading * start.conjugate()
-    me.lead = delay * dt
     me.position += me.moved
     if me.known:
-        me.target, me.target_theta = target_after(team, me, me.fix_age + me.lead)
+        me.target, me.target_theta = target_after(team, me, me.fix_age + team.world.lead)
         me.target_velocity = vector(me.target_speed, me.target_theta)
-        me.frame *= vector(1.0, me.psi_rate * me.lead)
+        me.frame *= vector(1.0, me.psi_rate * team.world.lead)
 
 
 @compiled
@@ -226,7 +203,7 @@ def execute_safely(team: Team, me: Record, discs: Records, velocity: complex, ac
     if delay > 0:
         kept = complex(clip(speed, 0.0, me.max_speed), clip(omega, -me.max_omega, me.max_omega))
         me.waiting[me.step % delay] = kept
-    write_motion(action, speed, omega, me.max_speed, me.max_omega)
+    write_motion(me, speed, omega, action)
     me.step += 1
 
 

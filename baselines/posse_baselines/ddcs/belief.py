@@ -1,4 +1,4 @@
-"""What a tracker believes, as numbers that a network can read.
+"""What a tracker of the DDCS believes, as numbers that a network can read.
 
 All vectors are relative to the tracker: x ahead, y to the left. A length d is scaled to
 d / (d + scale), which resolves both centimetres and tens of metres.
@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled, record_type
-from posse_baselines.ddcs.memory import GRID, Team, Work, for_each
+from posse_baselines.ddcs.memory import GRID, Minds, Team, for_each, since
 from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there
 from posse_baselines.ddcs.motion import age_of
 from posse_baselines.ddcs.settings import SEARCHING, TASKS
 from posse_baselines.laws.geometry import length, scaled, vector
-from posse_baselines.laws.steering import slot_velocity
+from posse_baselines.laws.steering import Work, slot_velocity
 
 _F, _C = np.float32, np.complex64
 _MATES: Final = 3
@@ -61,7 +61,7 @@ def soft(me: Record, v: complex, scale: float) -> complex:
 
 @compiled
 def believe(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, belief: Record) -> None:
-    """Write the :data:`BELIEF` of one tracker after it planned; it is 0 before."""
+    """Write the :data:`BELIEF` of one tracker; it is 0 before."""
     back = me.heading.conjugate()
     if me.known != 0:
         belief.known = 1.0
@@ -75,7 +75,7 @@ def believe(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
         belief.has_slot, belief.slot_near, belief.slot_far = 1.0, soft(me, way, _NEAR), soft(me, way, _FAR)
         belief.slot_velocity = slot_velocity(me.target_velocity, me.psi_rate, arm) * back
     if me.task == SEARCHING:
-        lost = float(me.step - max(0, me.lost_step)) * team.world.dt
+        lost = since(team, me, max(0, me.lost_step))
         belief.lost = lost / (lost + _LOST)
         if me.goal_step >= 0:
             belief.goal = soft(me, me.goal - me.position, _FAR)
@@ -116,4 +116,11 @@ def write_looks(team: Team, me: Record, belief: Record) -> None:
             belief.looks[k] = age_of(team, me, i, j, False) / team.settings.stale_after
 
 
-believe_all = for_each(believe)
+_believe_all = for_each(believe)
+
+
+def beliefs_of(minds: Minds, observations: FloatArray) -> FloatArray:
+    """Return what each tracker believes after it planned by observations (E, N, F): (E, N, BELIEF_SIZE)."""
+    beliefs = np.zeros(minds.me.shape, BELIEF)
+    minds.run(_believe_all, observations, beliefs)
+    return beliefs.view(np.float32).reshape(*beliefs.shape, BELIEF_SIZE)

@@ -9,6 +9,7 @@ constants of their scenario, are converted once, to a unit of :func:`unit_of` me
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
@@ -17,32 +18,18 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import (
-    MOST_THREADS,
-    BoolArray,
-    FloatArray,
-    OwnArrays,
-    Record,
-    Records,
-    compiled,
-    kernel,
-    over_worlds,
-    record_type,
-)
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import beam_directions
 from posse.scenarios.setting import OPEN_PLANE_EXTENT
-from posse_baselines.ddcs.settings import Settings, settings_record
-from posse_baselines.laws.guidance import BODY
-from posse_baselines.laws.safeguard import DISC
-from posse_baselines.laws.steering import WORK_ROWS
+from posse_baselines.ddcs.settings import TASKS, Settings
+from posse_baselines.laws.guidance import BODY, UNLIMITED
+from posse_baselines.laws.steering import Work, work_for
 
 Kernel = Callable[..., None]
 _F, _I, _C = np.float32, np.int32, np.complex64
-_MOST_DISCS: Final = 32
 _MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
 GRID: Final = 16
 """Cells of a tracker's map of covered areas, along each axis."""
-UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
 # --- what a team has in common -------------------------------------------------------------------
@@ -59,37 +46,6 @@ _RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
-
-OFFSETS: Final = record_type(
-    *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
-    ("neighbours", np.int32),  # places for team-mates
-    ("stride", np.int32),  # length of one team-mate's part
-    ("sonar_beams", np.int32),
-    ("message_size", np.int32),
-)
-"""Offsets of the fields of a layout.
-
-A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
-"""
-
-CONSTANTS: Final = record_type(
-    ("dt", np.float32),  # control step, s
-    ("delay", np.int32),  # control steps after which a command is executed
-    ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
-    ("sonar_range", np.float32),  # reading that means "nothing near", m
-    ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
-    ("radius", np.float32),  # of a robot's disc, m
-    ("walled", np.int32),
-    ("half_width", np.float32),  # of the arena, m
-    ("half_height", np.float32),
-    ("sight", np.float32),  # how far its target sensor reaches, m
-    ("searches", np.int32),  # 1: it may have to be searched for
-    ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
-    ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
-    ("area_y", np.float32),  # half its height
-    ("outermost", np.float64),  # distance of the outermost slot from the target, m
-)
-"""Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
 
 
 def unit_of(scenario: Scenario) -> float:
@@ -110,47 +66,80 @@ def in_units(layout: ObservationLayout, observations: FloatArray) -> FloatArray:
     return converted
 
 
+def _record(**values: Any) -> Records:
+    """Return an array of one record that has these values, in their types."""
+    arrays = {name: np.asarray(value) for name, value in values.items()}
+    record = np.zeros(1, record_type(*((name, array.dtype, array.shape) for name, array in arrays.items())))
+    for name, array in arrays.items():
+        record[name] = array
+    return record
+
+
 def offsets_of(layout: ObservationLayout) -> Records:
-    """Return an array of one :data:`OFFSETS`."""
-    record, scenario = np.zeros(1, OFFSETS), layout.scenario
-    for name in _FIELDS:
-        record[name] = layout.offsets.get(name, -1)
-    record["neighbours"], record["stride"] = layout.neighbours, layout.stride
-    record["sonar_beams"] = scenario.sonar_beams
-    record["message_size"] = scenario.message_size
-    return record
+    """Return where a layout has its fields, as an array of one record; -1: it has no such field.
+
+    A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
+    """
+    at = {name: layout.offsets.get(name, -1) for name in _FIELDS}
+    at |= {"neighbours": layout.neighbours, "stride": layout.stride}
+    at |= {name: getattr(layout.scenario, name) for name in ("sonar_beams", "message_size")}
+    return _record(**{name: _I(value) for name, value in at.items()})
 
 
-def constants_of(scenario: Scenario) -> Records:
-    """Return an array of one :data:`CONSTANTS`."""
-    record, unit = np.zeros(1, CONSTANTS), unit_of(scenario)
-    record["dt"] = scenario.control_step
-    lag = scenario.actuator_lag
-    record["delay"], record["followed"] = scenario.command_delay, 1.0
-    if lag > 0:
-        record["followed"] = 1 - math.exp(-scenario.control_step / lag)
-    record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
-    record["sonar_range"] = scenario.sonar_range / unit
-    record["radius"] = scenario.robot_radius / unit
-    record["sight"] = min(scenario.sensing_range / unit, _MOST_SIGHT)
+def constants_of(scenario: Scenario, settings: Settings) -> Records:
+    """Return what is constant of robots and arena, as an array of one record; a metre is a unit of :func:`unit_of`."""
+    unit, dt, lag = unit_of(scenario), _F(scenario.control_step), scenario.actuator_lag
+    foreseen = settings.foresight > 0.0 and scenario.command_delay <= _MOST_WAITING
+    delay = scenario.command_delay if foreseen else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
-    record["half_width"], record["half_height"] = half_width, half_height
-    record["area_x"], record["area_y"] = min(half_width, _OPEN_AREA), min(half_height, _OPEN_AREA)
-    record["searches"] = math.isfinite(scenario.sensing_range)
-    record["drifts"] = scenario.drifts
-    record["walled"] = scenario.walled
-    return record
+    return _record(
+        dt=dt,  # control step, s
+        delay=_I(delay),  # control steps after which a command is executed
+        lead=delay * float(dt),  # the same in s: how far decisions are ahead of the observation
+        # share of a wanted change of the motion that a step brings; 1: no lag
+        followed=1 - math.exp(-scenario.control_step / lag) if lag > 0 else 1.0,
+        sonar_range=_F(scenario.sonar_range / unit),  # reading that means "nothing near", m
+        # cosine of a little more than half a beam's width
+        wide_beam=_F(math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))),
+        radius=_F(scenario.robot_radius / unit),  # of a robot's disc, m
+        walled=_I(scenario.walled),
+        half_width=_F(half_width),  # of the arena, m
+        half_height=_F(half_height),
+        sight=_F(min(scenario.sensing_range / unit, _MOST_SIGHT)),  # how far its target sensor reaches, m
+        searches=_I(math.isfinite(scenario.sensing_range)),  # 1: it may have to be searched for
+        unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),  # 1: an observation has no place for some
+        drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
+        area_x=_F(min(half_width, _OPEN_AREA)),  # half the width of the rectangle that is to be searched, m
+        area_y=_F(min(half_height, _OPEN_AREA)),  # half its height
+        outermost=max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m
+    )
+
+
+def settings_of(settings: Settings) -> Records:
+    """Return settings as an array of one record.
+
+    A choice is its position among those allowed, ``forbidden`` a table of the transitions from a task (row) to another.
+    """
+    values: dict[str, Any] = {"forbidden": np.zeros((len(TASKS), len(TASKS)), np.int64)}
+    for transition in settings.forbidden:
+        before, after = transition.split(">")
+        values["forbidden"][TASKS.index(before), TASKS.index(after)] = 1
+    for field in dataclasses.fields(settings):
+        value, choices = getattr(settings, field.name), field.metadata.get("choices")
+        if field.name != "forbidden":
+            values[field.name] = choices.index(value) if choices else float(value)
+    return _record(**values)
 
 
 class Team(NamedTuple):
     """What the trackers of a team have in common."""
 
     at: Record
-    """:data:`OFFSETS`: where each field is in an observation."""
+    """:func:`offsets_of`: where each field is in an observation."""
     world: Record
-    """:data:`CONSTANTS`: robots and arena."""
+    """:func:`constants_of`: robots and arena."""
     settings: Record
-    """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
+    """:func:`settings_of`."""
     slots: npt.NDArray[np.complex64]
     """(N,) place of each slot in the slot frame, m."""
     beams: npt.NDArray[np.complex64]
@@ -162,14 +151,10 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     scenario = layout.scenario
     slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
-    world = constants_of(scenario)
-    world["outermost"] = max(map(abs, slots))
-    if settings.foresight == 0.0 or scenario.command_delay > _MOST_WAITING:
-        world["delay"] = 0
     return Team(
         offsets_of(layout),
-        world,
-        settings_record(settings),
+        constants_of(scenario, settings),
+        settings_of(settings),
         np.array(slots, np.complex64),
         (cosines + 1j * sines).astype(np.complex64),
     )
@@ -178,111 +163,83 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
 # --- memory --------------------------------------------------------------------------------------
 
 
-class Work(NamedTuple):
-    """Arrays that a step works in, one of each for a thread."""
-
-    cost: npt.NDArray[np.float64]
-    """(N, N) cost of each slot for each tracker, s."""
-    assigning: npt.NDArray[np.float64]
-    """(WORK_ROWS, N + 1) for the assignment."""
-    discs: Records
-    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
-
-
-def work_for(num_trackers: int) -> Work:
-    """Return the arrays of all threads."""
-    n, threads = num_trackers, MOST_THREADS
-    cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
-    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))
-
-
-def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:
-    """Return a record type, and a record with the value that each field has at the start of an episode."""
-    dtype = record_type(*((name, kind) for name, kind, _ in fields))
-    start = np.zeros((), dtype)
-    for name, _, value in fields:
-        start[name] = value
-    return dtype, start
-
-
-MIND, MIND_AT_START = _fields(
-    ("step", _I, 0),  # control steps since the episode began
+MIND: Final = _record(
+    step=_I(0),  # control steps since the episode began
     # this robot, from the observation of this step; heading, motion and limits are those of BODY
-    ("number", _I, 0),
-    ("position", np.complex128, 0),
-    *((name, BODY[name], 0) for name in BODY.names or ()),
+    number=_I(0),
+    position=np.complex128(0),
+    **{name: BODY[name].type(0) for name in BODY.names or ()},
     # the target, as it was at the newest fix
-    ("fix_step", _I, -1),  # own step of that fix; -1: none yet
-    ("fix", _C, 0),  # estimated position
-    ("raw", _C, 0),  # position by the fix alone
-    ("fix_theta", _F, 0),
-    ("fix_psi", _F, 0),
-    ("target_speed", _F, 0),  # estimated speed, m/s
-    ("target_turn", _F, 0),  # estimated turn rate, rad/s
-    ("target_mean", _C, 0),  # mean velocity
-    ("speed_known", _I, 0),  # 1: the speed has been measured
+    fix_step=_I(-1),  # own step of that fix; -1: none yet
+    fix=_C(0),  # estimated position
+    raw=_C(0),  # position by the fix alone
+    fix_theta=_F(0),
+    fix_psi=_F(0),
+    target_speed=_F(0),  # estimated speed, m/s
+    target_turn=_F(0),  # estimated turn rate, rad/s
+    target_mean=_C(0),  # mean velocity
+    speed_known=_I(0),  # 1: the speed has been measured
     # the target, as it is taken to be now
-    ("target", _C, 0),  # position
-    ("target_theta", _F, 0),
-    ("target_velocity", _C, 0),
-    ("psi_rate", _F, 0),  # turn rate of the slot frame, rad/s
-    ("psi_limit", _F, 0),  # its greatest, rad/s
-    ("frame", _C, 0),  # heading of the slot frame
-    ("fix_age", _F, 0),  # s
-    ("known", _I, 0),  # 1: there is an estimate that is not too old
-    ("horizon", _F, 0),  # distance within which every team-mate that is heard is listed, m
-    ("usual_gap", _F, 0),  # about the longest silence of a team-mate lately, s
-    ("usual_age", _F, 0),  # about the usual age of the fix, s
+    target=_C(0),  # position
+    target_theta=_F(0),
+    target_velocity=_C(0),
+    psi_rate=_F(0),  # turn rate of the slot frame, rad/s
+    psi_limit=_F(0),  # its greatest, rad/s
+    frame=_C(0),  # heading of the slot frame
+    fix_age=_F(0),  # s
+    known=_I(0),  # 1: there is an estimate that is not too old
+    horizon=_F(0),  # distance within which every team-mate that is heard is listed, m
+    usual_gap=_F(0),  # about the longest silence of a team-mate lately, s
+    usual_age=_F(0),  # about the usual age of the fix, s
     # tracking
-    ("task", _I, 0),
-    ("slot", _I, -1),  # -1: none
-    ("taken", np.uint64, 0),  # bit set of slots in which the sonar detected a robot not heard
-    ("closing", _I, 0),  # 1: the law itself, not the safeguard, keeps the range to the target
-    ("side", _I, 0),  # of the last detour: 1 left, -1 right
-    ("side_step", _I, 0),  # own step of that detour
+    task=_I(0),
+    slot=_I(-1),  # -1: none
+    taken=np.uint64(0),  # bit set of slots in which the sonar detected a robot not heard
+    closing=_I(0),  # 1: the law itself, not the safeguard, keeps the range to the target
+    side=_I(0),  # of the last detour: 1 left, -1 right
+    side_step=_I(0),  # own step of that detour
     # the tracking layer's result; float64, so that storing it changes no action
-    ("wish", np.complex128, 0),  # wanted velocity
-    ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
-    ("wish_omega", np.float64, 0),
+    wish=np.complex128(0),  # wanted velocity
+    wish_speed=np.float64(0),  # its command: m/s, rad/s
+    wish_omega=np.float64(0),
     # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
-    ("waiting", (np.complex128, (_MOST_WAITING,)), 0),
-    ("lead", np.float64, 0),  # s; how far position, heading and target are ahead of the observation
-    ("moved", np.complex128, 0),  # by then, m
-    ("turned", np.complex128, 1),  # by then, as a rotation
+    waiting=np.zeros(_MOST_WAITING, np.complex128),
+    moved=np.complex128(0),  # from the observation to the execution of the command, m
+    turned=np.complex128(1),  # by then, as a rotation
     # leadership
-    ("leader", _I, -1),  # -1: none yet
-    ("term", _I, 0),  # how often the lead has passed, modulo 256; the higher claim wins
-    ("pulse", _I, 0),  # the leader counts its steps, modulo 256; team-mates pass the count on
-    ("pulse_step", _I, 0),  # own step at which the count last went up
-    ("confirmed", _I, 0),  # 0: the leader has not been heard of since it was appointed
-    ("exchanges", _I, 0),  # times that the lead passed to another, as far as this one knows
+    leader=_I(-1),  # -1: none yet
+    term=_I(0),  # how often the lead has passed, modulo 256; the higher claim wins
+    pulse=_I(0),  # the leader counts its steps, modulo 256; team-mates pass the count on
+    pulse_step=_I(0),  # own step at which the count last went up
+    confirmed=_I(0),  # 0: the leader has not been heard of since it was appointed
+    exchanges=_I(0),  # times that the lead passed to another, as far as this one knows
     # searching
-    ("goal", _C, 0),
-    ("goal_step", _I, -1),  # own step at which the goal was chosen; -1: there is none
-    ("lost_step", _I, -1),  # when the target was lost; -1: never seen yet
-    ("area", _C, 0),  # middle of the area that is searched
-    ("seen", (np.uint16, (GRID * GRID,)), 0),  # map of it: own step + 1 at which a cell was last covered
+    goal=_C(0),
+    goal_step=_I(-1),  # own step at which the goal was chosen; -1: there is none
+    lost_step=_I(-1),  # when the target was lost; -1: never seen yet
+    area=_C(0),  # middle of the area that is searched
+    seen=np.zeros(GRID * GRID, np.uint16),  # map of it: own step + 1 at which a cell was last covered
 )
-"""Memory of one tracker, and its value at the start of an episode."""
+"""Memory of one tracker at the start of an episode, an array of one record."""
 
-MATE, MATE_AT_START = _fields(
-    ("step", _I, -1),  # own step at which it sent what follows; -1: never heard
-    ("fresh", _I, 0),  # 1: heard in this step
-    ("position", _C, 0),
-    ("velocity", _C, 0),
-    ("heading", _C, 0),
-    ("turn", _F, 0),  # turn rate, rad/s
+MATE: Final = _record(
+    step=_I(-1),  # own step at which it sent what follows; -1: never heard
+    heard=_I(-1),  # own step at which it was heard last
+    position=_C(0),
+    velocity=_C(0),
+    heading=_C(0),
+    turn=_F(0),  # turn rate, rad/s
     # from its drifting frame to the own one, measured by the target that both see
-    ("aligned", _I, 0),  # 1: has been measured
-    ("shift", _C, 0),  # m
-    ("twist", _F, 0),  # rad
-    ("task", _I, -1),
-    ("leader", _I, -1),
-    ("term", _I, -1),
-    ("pulse", _I, -1),
-    ("slot", _I, -1),  # -1: not said
+    aligned=_I(0),  # 1: has been measured
+    shift=_C(0),  # m
+    twist=_F(0),  # rad
+    task=_I(-1),
+    leader=_I(-1),
+    term=_I(-1),
+    pulse=_I(-1),
+    slot=_I(-1),  # -1: not said
 )
-"""Knowledge of a tracker about a team-mate, and its value at the start of an episode."""
+"""Knowledge of a tracker about a team-mate at the start of an episode, an array of one record."""
 
 
 class Minds(OwnArrays):
@@ -303,12 +260,12 @@ class Minds(OwnArrays):
 
     def __init__(self, layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> None:
         self.layout, self.team = layout, team_of(layout, settings)
-        self.me: Records = np.full((num_worlds, robots), MIND_AT_START)
-        self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE_AT_START)
+        self.me: Records = np.full((num_worlds, robots), MIND)
+        self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
-        self.me[mask], self.mates[mask] = MIND_AT_START, MATE_AT_START
+        self.me[mask], self.mates[mask] = MIND, MATE
 
     def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
         """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
@@ -348,6 +305,12 @@ def pair(row: FloatArray, at: int) -> complex:
 def is_due(team: Team, me: Record, period: float) -> bool:
     """Return whether what is done once a period (s) is done in this control step."""
     return bool(me.step % max(1, round(period / team.world.dt)) == 0)
+
+
+@compiled
+def since(team: Team, me: Record, step: int) -> float:
+    """Return the time (s) since an own step."""
+    return float((me.step - step) * team.world.dt)
 
 
 @compiled

@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import Team, pair
+from posse_baselines.ddcs.memory import Team, pair, since
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, vector, wrap
 
 MESSAGE_SIZE: Final = 5
@@ -85,7 +85,7 @@ def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None
     """
     at, dt = team.at, float(team.world.dt)
     if part_of(row[m]) > 0.5 and row[at.target_seen] > 0.0:
-        age = silence(team, me, mate) + dt
+        age = since(team, me, mate.step) + dt
         theta = wrap(me.fix_theta - me.target_turn * age)
         target = me.fix - vector(me.target_speed * age, me.fix_theta - 0.5 * me.target_turn * age)
         heading = wrap(theta - math.pi * part_of(row[m + 3]))  # of the mate, then, in the own frame
@@ -129,7 +129,7 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     me.known = 0
     if me.fix_step < 0:
         return
-    me.fix_age = (me.step - me.fix_step) * dt
+    me.fix_age = since(team, me, me.fix_step)
     if me.fix_age <= _LATE:
         # The usual age of fixes, to detect unusual delays.
         me.usual_age += (dt / _GAP_MEMORY) * (me.fix_age - me.usual_age)
@@ -185,8 +185,6 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
 def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
     """Update the table of team-mates (N,) with an observation (F,)."""
     at, settings, dt = team.at, team.settings, team.world.dt
-    for j in range(len(mates)):
-        mates[j].fresh = 0
     me.usual_gap -= me.usual_gap * min(1.0, dt / _GAP_MEMORY)
     if not settings.radio:
         return
@@ -207,7 +205,7 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
             gap = float((sent - mate.step) * dt + age)
             if gap < settings.lost_after:
                 me.usual_gap = max(me.usual_gap, gap)
-        mate.step, mate.fresh = sent, 1
+        mate.step, mate.heard = sent, me.step
         mate.position = me.position + scaled(pair(row, at.neighbour_bearing + k) * me.heading, away)
         heading = pair(row, at.neighbour_heading + k) * me.heading
         mate.heading, mate.velocity = heading, scaled(heading, row[at.neighbour_speed + k])
@@ -228,18 +226,11 @@ def patience(team: Team, me: Record) -> float:
 
 
 @compiled
-def silence(team: Team, me: Record, mate: Record) -> float:
-    """Return the age (s) of what is known of a team-mate."""
-    return float((me.step - mate.step) * team.world.dt)
-
-
-@compiled
 def is_there(team: Team, me: Record, mate: Record) -> bool:
     """Return whether a tracker is another one (nothing is heard of oneself) that counts as working and in range."""
     if mate.step < 0:
         return False
-    all_listed = team.at.neighbours >= len(team.slots) - 1
-    return silence(team, me, mate) <= (patience(team, me) if all_listed else _UNSEEN_MEMORY)
+    return since(team, me, mate.step) <= (_UNSEEN_MEMORY if team.world.unlisted else patience(team, me))
 
 
 @compiled
@@ -255,7 +246,7 @@ def others_there(team: Team, me: Record, mates: Records) -> int:
 @compiled
 def mate_now(team: Team, me: Record, mate: Record) -> tuple[complex, complex]:
     """Return the predicted position of a team-mate and its velocity; after a long silence it counts as stopped."""
-    age = silence(team, me, mate)
+    age = since(team, me, mate.step)
     if age > patience(team, me):
         return mate.position, 0j
-    return mate.position + scaled(mate.velocity, age + me.lead), mate.velocity
+    return mate.position + scaled(mate.velocity, age + team.world.lead), mate.velocity

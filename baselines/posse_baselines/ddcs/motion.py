@@ -19,8 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import GRID, Team, is_due
-from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience, silence
+from posse_baselines.ddcs.memory import GRID, Team, is_due, since
+from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import (
     BY_SLOT_FRAME,
@@ -214,11 +214,11 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
     A mate that has been silent for too long counts as stopped. In the first step, the mate is
     expected to move as the target does.
     """
-    theta, age = angle_of(mate.heading), silence(team, me, mate)
+    theta, age = angle_of(mate.heading), since(team, me, mate.step)
     speed, rate = 0.0, 0.0
     if age <= patience(team, me):
         speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
-        theta = wrap(theta + rate * (age + me.lead))
+        theta = wrap(theta + rate * (age + team.world.lead))
     frame = theta
     if team.settings.follower_frame == BY_SLOT_FRAME:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
@@ -321,8 +321,7 @@ def begin_search(team: Team, me: Record) -> None:
     me.lost_step, me.goal_step = me.step, -1
     if team.world.walled == 0 and me.fix_step >= 0:
         me.area = me.target
-        for k in range(GRID * GRID):
-            me.seen[k] = 0
+        me.seen[:] = 0
 
 
 @compiled
@@ -332,7 +331,7 @@ def look_around(team: Team, me: Record, mates: Records) -> None:
         return
     mark_seen(team, me, me.position)
     for j in range(len(mates)):
-        if mates[j].step >= 0 and silence(team, me, mates[j]) <= team.settings.lost_after:
+        if mates[j].step >= 0 and since(team, me, mates[j].step) <= team.settings.lost_after:
             mark_seen(team, me, mates[j].position)
 
 
@@ -342,7 +341,7 @@ def wander(team: Team, me: Record, mates: Records) -> complex:
     settings = team.settings
     way = me.goal - me.position
     near = settings.goal_reached * min(team.world.sight, 4.0)
-    time = (me.step - me.goal_step) * team.world.dt
+    time = since(team, me, me.goal_step)
     arrived = dot(way, way) < near * near and time > _LOOK_TIME
     if me.goal_step < 0 or arrived or time > settings.goal_time:
         choose_goal(team, me, mates)

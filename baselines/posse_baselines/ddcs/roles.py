@@ -25,11 +25,11 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import Team, Work, is_due
+from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
-from posse_baselines.laws.steering import Course, assign, time_to_slot
+from posse_baselines.laws.steering import Course, Work, assign, time_to_slot
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
@@ -41,9 +41,7 @@ _BIT: Final = np.uint64(1)
 
 @compiled
 def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool:
-    """Return whether a claim (term, leader) wins over another; -1 is no leader."""
-    if leader < 0:
-        return False
+    """Return whether a claim (term, leader) wins over another, whose leader may be -1: none."""
     if old_leader < 0 or is_newer(term, old_term):
         return True
     return term == old_term and leader < old_leader
@@ -66,12 +64,12 @@ def position_of(team: Team, me: Record, mates: Records, j: int) -> complex:
 
 
 @compiled
-def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tuple[int, float]:
-    """Return the working tracker other than ``barred`` (-1: any) that is nearest to the target, and its distance."""
+def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]:
+    """Return the working tracker that is nearest to the target, another one than the leader or itself; its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
-        if j != barred and is_there(team, me, mates[j]):
-            distance = length(me.target - position_of(team, me, mates, j))
+        if j != me.leader and is_there(team, me, mates[j]):
+            distance = length(me.target - mate_now(team, me, mates[j])[0])
             if distance < least:
                 best, least = j, distance
     return best, least
@@ -94,26 +92,26 @@ def central_tracker(team: Team, me: Record, mates: Records) -> int:
 
 
 @compiled
-def select_leader(team: Team, me: Record, mates: Records, barred: int) -> None:
-    """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
+def select_leader(team: Team, me: Record, mates: Records) -> None:
+    """Appoint a tracker other than the leader under a new term."""
     best, term = int(me.number), me.term + 1
     if me.known:
-        best, _ = nearest_tracker(team, me, mates, barred)
+        best, _ = nearest_tracker(team, me, mates)
     elif others_there(team, me, mates) == 0:
         term = me.term - 1
     else:
         central = central_tracker(team, me, mates)
-        best = central if central != barred else best
+        best = central if central != me.leader else best
     appoint(me, best, term % COUNT, 0)
 
 
 @compiled
 def settle_lead(team: Team, me: Record, mates: Records) -> None:
     """Process received claims; hand over or appoint if due."""
-    settings, dt = team.settings, team.world.dt
+    settings = team.settings
     for j in range(len(mates)):
         mate = mates[j]
-        if mate.fresh == 0 or mate.leader < 0:
+        if mate.heard != me.step or mate.leader < 0:
             continue
         if mate.leader == me.leader and mate.term == me.term:
             if is_newer(mate.pulse, me.pulse):
@@ -123,18 +121,18 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     if me.leader == me.number:
         me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1
     if me.leader < 0:
-        select_leader(team, me, mates, -1)
+        select_leader(team, me, mates)
         return
     # In the search there are no followers, and leadership changes without the exchange task.
     if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
         return
     if me.leader == me.number:
         if me.known and is_due(team, me, settings.time_lag):
-            best, least = nearest_tracker(team, me, mates, -1)
+            best, least = nearest_tracker(team, me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
-    elif (me.step - me.pulse_step) * dt > patience(team, me) + settings.lead_patience:
-        select_leader(team, me, mates, me.leader)
+    elif since(team, me, me.pulse_step) > patience(team, me) + settings.lead_patience:
+        select_leader(team, me, mates)
 
 
 @compiled
@@ -169,7 +167,7 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     for j in range(n):
         mate = mates[j]
         there = j == me.number or is_there(team, me, mate)
-        if not there and (team.at.neighbours >= n - 1 or mate.slot < 0):
+        if not there and (team.world.unlisted == 0 or mate.slot < 0):
             continue
         if not there:
             # It has no place in the observation but claimed a slot. If it were still near its
@@ -195,24 +193,24 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             cost[j, k] = time + 1e-4 * j
     assign(cost, work.assigning)
     slot = int(work.assigning[0, me.number])
-    if me.slot == slot and has_precedence(team, me, mates, slot):
+    if me.slot == slot and has_precedence(team, me, mates):
         cost[me.number, slot] = _RESERVED
         assign(cost, work.assigning)
     me.slot = int(work.assigning[0, me.number])
 
 
 @compiled
-def has_precedence(team: Team, me: Record, mates: Records, slot: int) -> bool:
-    """Return whether a team-mate that claims a slot has precedence over this tracker.
+def has_precedence(team: Team, me: Record, mates: Records) -> bool:
+    """Return whether a team-mate that claims the own slot has precedence over this tracker.
 
     The nearer one has; for equal distances the lower number. Both trackers get the same result,
     whatever else they know.
     """
-    place = me.target + team.slots[slot] * me.frame
+    place = me.target + team.slots[me.slot] * me.frame
     mine = length(place - me.position)
     for j in range(len(mates)):
-        if mates[j].slot == slot and is_there(team, me, mates[j]):
-            other = length(place - position_of(team, me, mates, j))
+        if mates[j].slot == me.slot and is_there(team, me, mates[j]):
+            other = length(place - mate_now(team, me, mates[j])[0])
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
                 return True
     return False

@@ -6,9 +6,6 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-
-from posse.numeric import Records, record_type
 from posse_baselines.fields import check, choice, number, tuned
 
 MODELS: Final = ("distributed", "centralized")
@@ -189,28 +186,3 @@ class Settings:
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""
         return dataclasses.replace(self, **overrides)
-
-
-SETTINGS: Final = record_type(
-    *(
-        ("forbidden", np.int64, (len(TASKS), len(TASKS)))
-        if field.name == "forbidden"
-        else (field.name, np.float64 if "low" in field.metadata else np.int64)
-        for field in dataclasses.fields(Settings)
-    )
-)
-"""Settings as the kernels read them; a choice is its position among those allowed, ``forbidden`` a table of the
-transitions from a task (row) to another."""
-
-
-def settings_record(settings: Settings) -> Records:
-    """Return an array of one :data:`SETTINGS`."""
-    record = np.zeros(1, SETTINGS)
-    for field in dataclasses.fields(settings):
-        value, choices = getattr(settings, field.name), field.metadata.get("choices")
-        if field.name != "forbidden":
-            record[field.name] = choices.index(value) if choices else value
-    for transition in settings.forbidden:
-        before, after = transition.split(">")
-        record["forbidden"][0, TASKS.index(before), TASKS.index(after)] = 1
-    return record

@@ -46,6 +46,8 @@ _MIN_RANGE: Final = 1e-3  # m; a shorter one counts as this one where it is divi
 _BRAKING_SHARE: Final = 0.8
 _STANDSTILL: Final = 1e-3  # m/s
 
+UNLIMITED: Final = 1e4
+"""m/s² or rad/s². What stands for no limit."""
 BODY: Final = record_type(
     ("heading", np.complex128),
     ("speed", np.float64),  # m/s
@@ -152,7 +154,7 @@ def regulate(body: Record, velocity: complex, rate: float) -> tuple[float, float
 
 
 @compiled
-def write_motion(action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float) -> None:
+def write_motion(body: Record, speed: float, omega: float, action: FloatArray) -> None:
     """Write a command as the first two numbers of an action (2 + m,), clipped to [-1, 1]."""
-    action[0] = clip(2.0 * speed / max_speed - 1.0, -1.0, 1.0)
-    action[1] = clip(omega / max_omega, -1.0, 1.0)
+    action[0] = clip(2.0 * speed / body.max_speed - 1.0, -1.0, 1.0)
+    action[1] = clip(omega / body.max_omega, -1.0, 1.0)

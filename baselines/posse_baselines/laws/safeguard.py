@@ -14,13 +14,16 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled, record_type
-from posse_baselines.laws.geometry import clip, dot, length, scaled, vector, wrap
+from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector, wrap
 from posse_baselines.laws.guidance import heading_error, turn_command
 
 NEAR: Final = 3.0
 """m. Objects farther away are no danger yet."""
 WALLS: Final = np.array((1.0, -1.0, 1.0j, -1.0j))
 """Outward normals of the walls."""
+
+MOST_TURN: Final = 2.0
+"""rad. Farther round is no way past a disc."""
 
 _STEPS: Final = np.array((0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25))  # of a simulated velocity, s
 _HORIZON: Final = sum(_STEPS.tolist())
@@ -40,6 +43,8 @@ _CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
 _CONTACT_COST: Final = 4.0
 _INTRUSION_COST: Final = 3.0
 _PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
+_LARGEST: Final = 2.0  # m; reach of a disc that is passed by a detour; walls are larger
+_ROUNDS: Final = 6  # discs that a detour passes on one side, at most
 
 DISC: Final = record_type(
     ("place", np.complex128),  # from the tracker, m
@@ -179,3 +184,31 @@ def safe_velocity(body: Record, discs: Records, wanted: complex) -> tuple[comple
             if cost < least:
                 least, best = cost, velocity
     return best, True
+
+
+@compiled
+def turn_past(discs: Records, clearance: float, wanted: complex, side: float) -> float:
+    """Return the turn (rad, left positive) from a unit vector to a clear direction on a side (1: left, -1: right).
+
+    Standing discs are in the way, not walls. ``2 * MOST_TURN`` if there is none within ``MOST_TURN``.
+    """
+    turn, ahead = 0.0, wanted
+    for _ in range(_ROUNDS):
+        least, nearest = 1e9, -1
+        for k in range(len(discs)):
+            disc = discs[k]
+            if disc.velocity != 0j or disc.reach > _LARGEST or dot(disc.place, ahead) <= 0.0:
+                continue
+            # A little less than the tangent's clearance, or the tangent itself would be blocked.
+            if abs(cross(disc.place, ahead)) < 0.98 * (disc.reach + clearance) and length(disc.place) < least:
+                least, nearest = length(disc.place), k
+        if nearest < 0:
+            return turn
+        disc = discs[nearest]
+        half = math.asin(min(1.0, (disc.reach + clearance) / max(least, 1e-6)))
+        # From the wanted direction to the disc's centre, then to its edge.
+        turn = angle_of(disc.place * wanted.conjugate()) + side * half
+        if abs(turn) > MOST_TURN:
+            return 2.0 * MOST_TURN
+        ahead = wanted * vector(1.0, turn)
+    return 2.0 * MOST_TURN

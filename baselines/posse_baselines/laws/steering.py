@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import compiled
+from posse.numeric import MOST_THREADS, Records, compiled
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
+from posse_baselines.laws.safeguard import DISC
 
 NEVER: Final = 1e6
 """s. Value for no interception."""
@@ -24,7 +26,26 @@ _MIN_DISTANCE: Final = 1e-3  # m; a shorter one counts as this one where it is d
 _FARTHEST: Final = 20.0  # s; later interceptions are planned with this time
 _SOON: Final = 0.1  # s; before that only the current velocity counts
 _LEAST_TURN: Final = 0.6  # rad; least angle ahead on the circle for a tracker on or inside it
+_MOST_DISCS: Final = 32
 _BRAKING_SHARE: Final = 0.8  # of the greatest deceleration, which a planned approach uses
+
+
+class Work(NamedTuple):
+    """Arrays that laws work in, one of each for a thread."""
+
+    cost: npt.NDArray[np.float64]
+    """(N, N) cost of each slot for each tracker, s."""
+    assigning: npt.NDArray[np.float64]
+    """(WORK_ROWS, N + 1) for :func:`assign`."""
+    discs: Records
+    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near a robot."""
+
+
+def work_for(num_trackers: int) -> Work:
+    """Return the arrays of all threads."""
+    n, threads = num_trackers, MOST_THREADS
+    cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
+    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))
 
 
 class Course(NamedTuple):

@@ -332,9 +332,9 @@ class BeliefPlanner(DDCS):
         BasePolicy.begin(self, layout, num_worlds)
         return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
 
-    def propose(self, observations: FloatArray, memory: Memory, *, believes: bool = False) -> tuple[FloatArray, Memory]:
+    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
-        proposals, memory = super().propose(observations, memory, believes=believes)
+        proposals, memory = super().propose(observations, memory)
         me, mates, team, beliefs = memory.me, memory.mates, memory.team, memory.beliefs
         shape = me.shape
         plans = beliefs.search.teams.plans.reshape(mates.shape)
@@ -353,7 +353,7 @@ class BeliefPlanner(DDCS):
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])
         own = wish * me["heading"].conj() / me["max_speed"]
-        proposals[planned, :2] = np.stack([own.real, own.imag], axis=-1)[planned]
+        proposals[planned] = np.stack([own.real, own.imag], axis=-1)[planned]
         return proposals, memory
 
     def annotations(self, memory: Memory) -> Annotations:

@@ -15,11 +15,19 @@ import numpy.typing as npt
 from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
-from posse_baselines.ddcs.memory import UNLIMITED, Work, work_for
 from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
-from posse_baselines.laws.guidance import BODY, regulate, write_motion
+from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
-from posse_baselines.laws.steering import Course, approach_velocity, assign, meeting_velocity, time_to_slot, way_round
+from posse_baselines.laws.steering import (
+    Course,
+    Work,
+    approach_velocity,
+    assign,
+    meeting_velocity,
+    time_to_slot,
+    way_round,
+    work_for,
+)
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
@@ -246,7 +254,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
     for i in range(c.num_trackers):
         t, me = scene.trackers[i], scene.plans[i]
         if t.broken_at != NEVER:
-            write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
+            actions[i, 0], actions[i, 1] = -1.0, 0.0
             continue
         me.heading, me.speed, me.omega = complex(t.heading_cos, t.heading_sin), t.speed, t.turn_rate
         me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
@@ -259,7 +267,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
             v, omega = v + more * (v - me.speed), omega + more * (omega - me.omega)
-        write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
+        write_motion(me, v, omega, actions[i])
 
 
 @kernel

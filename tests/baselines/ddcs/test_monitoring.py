@@ -12,9 +12,8 @@ from tests.support.reference.state import Complexes, directions, points
 import posse
 from posse_baselines import begin, load
 from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
-from posse_baselines.ddcs.actuation import turn_past
-from posse_baselines.ddcs.belief import BELIEF
-from posse_baselines.laws.safeguard import DISC, put_disc
+from posse_baselines.ddcs.belief import BELIEF, beliefs_of
+from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
 
 
 @pytest.mark.parametrize(
@@ -87,8 +86,8 @@ def way(soft: Complexes, scale: float) -> Complexes:
     return np.asarray(soft * scale / (1.0 - np.abs(soft)))
 
 
-def beliefs(proposals: Any) -> Any:
-    return np.ascontiguousarray(proposals[..., 2:]).view(BELIEF)[..., 0]
+def beliefs(memory: Any, observations: Any) -> Any:
+    return np.ascontiguousarray(beliefs_of(memory, observations)).view(BELIEF)[..., 0]
 
 
 def test_the_belief_of_a_team_in_formation_is_correct() -> None:
@@ -98,7 +97,8 @@ def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     for _ in range(250):
         actions, memory = ddcs.act(observations, memory)
         observations = batch.step(actions)[0]
-    belief = beliefs(ddcs.propose(observations, memory, believes=True)[0])
+    ddcs.propose(observations, memory)
+    belief = beliefs(memory, observations)
     at, own, target = points(batch, "tracker"), directions(batch, "tracker"), points(batch, "world")[:, None]
     assert belief.shape == (8, 5)
     assert (belief["known"] == 1.0).all()
@@ -123,14 +123,14 @@ def test_a_searcher_has_no_estimate_of_the_target() -> None:
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     lost = []
     for _ in range(20):
-        proposals, memory = ddcs.propose(observations, memory, believes=True)
-        belief = beliefs(proposals)
+        proposals, memory = ddcs.propose(observations, memory)
+        belief = beliefs(memory, observations)
         searching = belief["task"][..., SEARCHING] == 1.0
         assert searching.any()
         for name in ("known", "target", "target_velocity", "frame", "frame_rate", "age", "has_slot", "slot_near"):
             assert not belief[name][searching].any()
         lost.append(belief["lost"][searching].max())
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals[..., :2]))
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
         observations = batch.step(actions)[0]
     np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)
 

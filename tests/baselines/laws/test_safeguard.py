@@ -11,6 +11,7 @@ import pytest
 from tests.baselines.laws.test_guidance import body_of
 
 from posse import get_scenario
+from posse_baselines.ddcs import Settings
 from posse_baselines.ddcs.memory import constants_of
 from posse_baselines.laws.guidance import regulate
 from posse_baselines.laws.safeguard import DISC, put_disc, put_walls, safe_velocity
@@ -89,7 +90,7 @@ def test_a_resting_robot_gives_way_to_what_comes_at_it(limits: tuple[float, floa
 @LIMITS
 def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> None:
     body, place, nearest, discs = body_of(0.3, 1.0, limits), 0j, math.inf, np.zeros(4, DISC)
-    room = constants_of(get_scenario("search", arena=(6.0, 12.0)))[0]
+    room = constants_of(get_scenario("search", arena=(6.0, 12.0)), Settings())[0]
     for _ in range(80):
         count = put_walls(discs, 0, room, place, 0.15, 0.15)
         velocity, _ = safe_velocity(body, discs[:count], 1 + 0j)
