@@ -1,4 +1,4 @@
-"""Imports go from training to baselines to envs only; the tests named on the page docs/reliability.md exist."""
+"""Imports go from training to baselines to envs only; the tests that the manual names exist."""
 
 from __future__ import annotations
 
@@ -83,3 +83,13 @@ def test_every_promise_names_tests_that_exist() -> None:
     rows = [line for line in promised.splitlines() if line.startswith("| ")][2:]
     assert len(rows) >= 6
     assert [row for row in rows if "`tests/" not in row] == []
+
+
+def test_the_table_of_the_paper_names_functions_and_tests_that_exist() -> None:
+    table = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8").partition("## Misprints")[0]
+    named = re.findall(r"`(?:\w+/)?(\w+)\.(\w+)`", table)
+    assert len(named) > 20
+    for module, name in named:
+        files = [file for room in ("envs", "baselines", "tests") for file in (ROOT / room).rglob(f"{module}.py")]
+        assert files, module
+        assert name == "py" or any(f"def {name}(" in file.read_text(encoding="utf-8") for file in files), name
