@@ -17,10 +17,9 @@ from posse_baselines.ddcs.settings import NO_EXCHANGE, TRANSITIONS
 NO_RETURN = ("exchange>converging", "exchange>flocking")
 
 
-def metrics(name: str, scenario: str, *forbidden: str, worlds: int = 24) -> dict[str, Any]:
+def metrics(name: str, scenario: str, *forbidden: str) -> dict[str, Any]:
     policy = DDCS.of(name).with_settings(forbidden=forbidden)
-    batch = posse.batch(scenario, worlds, seed=3, split="train", message_size=5)
-    return play(batch, policy)
+    return play(posse.batch(scenario, 24, seed=3, split="train", message_size=5), policy)
 
 
 # --- when they change ----------------------------------------------------------------------------
