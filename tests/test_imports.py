@@ -1,4 +1,4 @@
-"""Imports go from training to baselines to envs only; the tests named on the page docs/reliability.md exist."""
+"""Imports go from training to baselines to envs only; the tests that the manual names exist."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ def test_imports_run_one_way(package: str) -> None:
     assert {source: wrong for source, found in packages.items() if (wrong := found & FORBIDDEN[package])} == {}
 
 
-@pytest.mark.parametrize("package", ["posse", "posse_baselines"])
+@pytest.mark.parametrize("package", ["posse", "posse_baselines", "posse_training.demo"])
 def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
-    code = f"import sys, {package}; print(*sorted(set(sys.modules) & {LEARNING!r}))"
+    others = LEARNING - {package.partition(".")[0]}
+    code = f"import sys, {package}; print(*sorted(set(sys.modules) & {others!r}))"
     assert printed("-c", code).split() == []
 
 
@@ -82,3 +83,13 @@ def test_every_promise_names_tests_that_exist() -> None:
     rows = [line for line in promised.splitlines() if line.startswith("| ")][2:]
     assert len(rows) >= 6
     assert [row for row in rows if "`tests/" not in row] == []
+
+
+def test_the_table_of_the_paper_names_functions_and_tests_that_exist() -> None:
+    table = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8").partition("## Misprints")[0]
+    named = re.findall(r"`(?:\w+/)?(\w+)\.(\w+)`", table)
+    assert len(named) > 20
+    for module, name in named:
+        files = [file for room in ("envs", "baselines", "tests") for file in (ROOT / room).rglob(f"{module}.py")]
+        assert files, module
+        assert name == "py" or any(f"def {name}(" in file.read_text(encoding="utf-8") for file in files), name

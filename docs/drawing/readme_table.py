@@ -33,7 +33,7 @@ def table() -> str:
         found = {r.policy: r for r in standings.of_scenario(scenario)}  # the best first
         if not found:
             continue
-        teams = [name for name, r in found.items() if not r.reads_state and name != PLAYS_AHEAD]
+        teams = [name for name, r in found.items() if not standings.is_reference(r)]
         script, nothing, correction = (
             _cell(found, next((name for name in teams if corrects.get(name) is kind), ""), named=True)
             for kind in (None, False, True)

@@ -35,11 +35,16 @@ def standings(path: Path) -> tuple[Standing, ...]:
     return tuple(sorted(known, key=lambda row: -row.safe_score))
 
 
+def is_reference(row: Standing) -> bool:
+    """Return whether a row stands beside the ranks: it reads the state, or is too slow for enough worlds."""
+    return row.reads_state or row.policy == "belief-planner"
+
+
 def of_scenario(scenario: str) -> list[Standing]:
     """Return the rows of a scenario: references first, then teams with enough worlds, the best first."""
     mine = [row for row in standings(STANDINGS) if row.scenario == scenario]
-    ranked = [row for row in mine if not row.reads_state and row.worlds >= WORLDS]
-    return [row for row in mine if row.reads_state] + ranked
+    ranked = [row for row in mine if not is_reference(row) and row.worlds >= WORLDS]
+    return [row for row in mine if is_reference(row)] + ranked
 
 
 def leaderboard() -> str:
@@ -48,8 +53,8 @@ def leaderboard() -> str:
     for scenario in SCENARIOS:
         rows, rank = [], 0
         for row in of_scenario(scenario):
-            rank += not row.reads_state
-            place = "" if row.reads_state else rank
+            rank += not is_reference(row)
+            place = "" if is_reference(row) else rank
             worlds = (f"{row.worlds:,}", row.seed, code(row.commit[:7]))
             rows.append((place, _name(row), _score(row), f"{row.contact_free:.1%}", *worlds))
         header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit")
@@ -156,7 +161,7 @@ def _mean(values: Iterable[float]) -> float:
 def _name(row: Standing) -> str:
     """Return a label, whose letters ``Standing`` has checked."""
     shown = code(row.label) if row.label == row.policy else row.label
-    return shown + (" (reference)" if row.reads_state else "")
+    return shown + (" (reference)" if is_reference(row) else "")
 
 
 def _score(row: Standing) -> str:

@@ -99,6 +99,7 @@ def test_teams_are_ranked_by_the_safe_score(
         {"label": "first", "safe_score": 0.55, "seed": 7},
         {"label": "second"},
         {"label": "knows", "safe_score": 0.6, "reads_state": True, "worlds": 100},
+        {"label": "slow", "safe_score": 0.58, "policy": "belief-planner", "worlds": 100},
         *({"label": "unlisted", **change} for change in ({"version": 99}, {"worlds": 999})),
     ]
     path, standings = tmp_path / "standings.csv", hook("standings")
@@ -107,8 +108,10 @@ def test_teams_are_ranked_by_the_safe_score(
     table = standings.leaderboard().split("### smart\n")[1].split("###")[0]
     rows_of = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("|")]
     listed = [[cell.strip() for cell in row] for row in rows_of[2:]]
-    assert [row[:2] for row in listed] == [["", "knows (reference)"], ["1", "first"], ["2", "second"], ["3", "third"]]
-    assert listed[1][2:] == ["0.550&nbsp;[0.400,&nbsp;0.600]", "75.0%", "1,000", "7", "`932670c`"]
+    assert [row[0] for row in listed] == ["", "", "1", "2", "3"]
+    assert [row[1] for row in listed] == ["knows (reference)", "slow (reference)", "first", "second", "third"]
+    assert "| 0.580 |" in hook("readme_table").table()
+    assert listed[2][2:] == ["0.550&nbsp;[0.400,&nbsp;0.600]", "75.0%", "1,000", "7", "`932670c`"]
 
 
 def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(

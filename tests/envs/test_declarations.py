@@ -13,7 +13,6 @@ from tests.support.process import examples, run
 FIELD = '@posse.field({})\ndef own({}):\n    """Own."""\n    return {}\nposse.batch(extra_fields=["own"]).reset()'
 TERM = '@posse.reward_term("1")\ndef own({}):\n    """Own."""\n    {}\nposse.batch(reward_weights={{"own": 1}})'
 MOTION = '@posse.target_motion("own"{})\ndef own(c, w{}):\n    """Own."""\n    {}\nposse.batch(target_motion="own")'
-MEASURED = "def m({}):\n    return dx, dy\n"
 METRIC = '@posse.metric({})\ndef own(c, w):\n    """Own."""\n    return w.score\n'
 SENSOR = (
     'def m({}):\n    return dx, dy\n@posse.sensor({})\ndef own(c, w, t, dx, dy):\n    """Own."""\n    return True\n'

@@ -18,17 +18,14 @@ from posse_baselines.policies.simple import Idle
 
 
 class Raises(Idle):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        raise ZeroDivisionError("[bold]by zero[/bold]")
+    """Raises what cannot be pickled, with a message that looks like markup."""
 
-
-class RaisesUnpicklable(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         class LocalError(Exception):
             def __reduce__(self) -> Any:
                 raise TypeError("never pickled")
 
-        raise LocalError("local")
+        raise LocalError("[bold]local[/bold]")
 
 
 class Nan(Idle):

@@ -69,9 +69,9 @@ def opened(
     assert [text for text in heard if not text.startswith(own)] == []
 
 
-def until(page: Page, expression: str, seconds: float = 40.0) -> None:
+def until(page: Page, expression: str) -> None:
     """Wait until a JavaScript expression is true."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + 40.0
     while not page.evaluate(expression):
         assert time.monotonic() < end, f"never true: {expression}"
         page.wait_for_timeout(20)

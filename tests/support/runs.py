@@ -19,11 +19,6 @@ from posse_training.train.checkpoint import read_checkpoint
 from posse_training.train.train import train
 
 HORIZON = 40
-ALGORITHMS = ("ppo", "mappo", "sac", "td3")
-ALGORITHM_CASES = [
-    pytest.param(name, marks=() if name in ("ppo", "mappo") else pytest.mark.long) for name in ALGORITHMS
-]
-"""The algorithms as cases of tests; the slow ones run with the long tests."""
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:

@@ -66,13 +66,3 @@ def small(out: Path, **changes: Any) -> TuneSettings:
         "every": 2,
     }
     return TuneSettings(**(values | changes))
-
-
-class WithoutEffect(Biased):
-    """Settings that change nothing."""
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        return DDCS.act(self, observations, memory)
-
-    def with_settings(self, **values: Any) -> WithoutEffect:
-        return self

@@ -55,7 +55,15 @@ INVALID = {
     "play --out play.txt": "--out play.txt must end in .html",
     "play idle": "no window can be opened",
     "reproduce --seed -1": "seed=-1",
+    "reproduce --starts 0": "starts=0 must be at least 1",
+    "scenarios smrt": "unknown scenario 'smrt' (did you mean 'smart'",
+    "demo --episodes 0": "episodes=0",
+    "record": "no policies given",
+    "record idle random --episodes 1": "episodes=1 must be at least 2",
+    "league --generations 0": "generations=0 must lie in [1, 10000]",
+    "verify nowhere": "No such file or directory: 'nowhere/standing.csv'",
     "compare pursuit --episodes 0": "episodes=0",
+    "compare pursuit --target smrat": "unknown target 'smrat' (did you mean 'smart'",
     "replay": "1 to 4 players, got 0: give at least one policy",
     "replay idle --set arna=6,4": "did you mean 'arena'",
     "export pursuit --out x.onnx": "pursuit",
@@ -66,7 +74,7 @@ INVALID = {
     "tune pngl --scenario smrt": "unknown scenario 'smrt' (did you mean 'smart'",
     "tune pngl --minutes nan": "minutes=nan must lie in [0.001, 10000]",
     "tune pngl --seed -1": "seed=-1 must lie in",
-    "tune pngl --only gian": "only='gian' is not a tunable setting of 'pngl'",
+    "tune pngl --only gian": "unknown tunable setting of 'pngl' 'gian' (did you mean 'gain'",
     "train --seed -1": "seed=-1",
     f"train --steps {10**30}": "steps=",
     "train --beside nobody": "unknown policy 'nobody'",
@@ -111,8 +119,10 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280
     assert settings["overrides"] == {"horizon": 40, "settle_time": 1.0}
+    kept = {path: path.read_bytes() for path in folder.iterdir()}
     assert main([*arguments.split(), "--discount", "0.9"]) == 2
     assert "holds a run with discount=0.99, not 0.9: choose another --out" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in folder.iterdir()} == kept
     assert main([*arguments.split(), "--steps", "1600"]) == 0
     assert "resuming" in capsys.readouterr().out
     assert json.loads((folder / "settings.json").read_text())["steps"] == steps_saved(folder) == 1600

@@ -96,7 +96,6 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"generations": 0}, SettingsError, "generations=0 must"),
         ({"teams": ()}, SettingsError, "teams"),
         ({"targets": ("smart,evader",)}, SettingsError, "without commas"),
         ({"teams": ("a/best.json", "b/best.json")}, SettingsError, "must have different names"),

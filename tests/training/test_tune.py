@@ -49,12 +49,15 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     assert card_of(small(tmp_path / "again", generations=generations)) == card
 
 
-def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
+def test_a_folder_of_another_run_or_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = tmp_path / "run"
     tune(small(run, generations=1), console=quiet())
     with pytest.raises(RunFolderError, match="holds a run with seed=3, not 4"):
         tune(small(run, seed=4), console=quiet())
     with locked(run), pytest.raises(RunFolderError, match="is in use by process"):
+        tune(small(run), console=quiet())
+    monkeypatch.setattr("posse_training.tune.software", lambda *names: dict.fromkeys(names, "0"))
+    with pytest.raises(RunFolderError, match=r"cmaes='[0-9.]+', not '0'"):
         tune(small(run), console=quiet())
 
 
@@ -66,9 +69,10 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
         tune(small(tmp_path / "run"), console=quiet())
 
 
-def test_a_search_without_any_effect_is_refused(tmp_path: Path) -> None:
+def test_a_search_without_any_effect_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_Run, "_effective", lambda _: [])
     with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
-        tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
+        tune(small(tmp_path), console=quiet())
 
 
 def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_default() -> None:

@@ -148,8 +148,9 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     require("training", "cmaes")
     run, folder = _Run(settings, console or Console()), settings.folder
     held = {name: value for name, value in asdict(settings).items() if name not in _FREE}
+    held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
     with connected(settings.ray), locked(folder):
-        hold_settings(folder / "settings.json", {**held, "scenario_version": run.scenario.version})
+        hold_settings(folder / "settings.json", held)
         write_json(folder / RESULT, run.play())
     return folder / RESULT
 

@@ -23,6 +23,7 @@ from posse_baselines.ddcs.baseline import FAMILY
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
         ({"navigation_constant": 1.2}, r"navigation_constant=1.2 must lie in \[0.9, 1.1\]"),
         ({"follower_law": "l-psi"}, "follower_law='l-psi' is unknown; known: l-phi, l-l"),
+        ({"forbidden": ("flocking>flocking",)}, "forbidden='flocking>flocking' is unknown"),
     ],
 )
 def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tests.support.drive import Floats, Instant, complex_of, drive
+from tests.support.drive import Floats, complex_of, drive
 
 from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import CONVERGING, FLOCKING
@@ -68,15 +68,10 @@ def test_pngl_as_printed_meets_its_target_when_its_equations_say(general: float)
         np.testing.assert_allclose(times[:-1], exact[:-1], rtol=0.01)
 
 
-def on_a_circle(policy: str | Policy, seconds: float, rate: float = 0.3) -> list[Instant]:
-    """One tracker after a target on a circle of 2 m about (0, 2)."""
-    start: dict[str, Any] = {"tracker_pose": [(-1.2, -1.0, 0.0)], "target_pose": (0.0, 0.0, 0.0), "num_trackers": 1}
-    return list(drive(policy, "constant", 1, round(10 * seconds), target=lambda _: (0.6, rate), **start))
-
-
 def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> None:
-    # R_t² = R_p² + r², with R_t = 2 and r = 1.2.
-    last = on_a_circle("velocity-pursuit", 90.0)[-100:]
+    # R_t² = R_p² + r², with R_t = 2, about (0, 2), and r = 1.2.
+    start: dict[str, Any] = {"tracker_pose": [(-1.2, -1.0, 0.0)], "target_pose": (0.0, 0.0, 0.0), "num_trackers": 1}
+    last = list(drive("velocity-pursuit", "constant", 1, 900, target=lambda _: (0.6, 0.3), **start))[-100:]
     radii = [abs(complex_of(now.tracker)[0, 0] - 2j) for now in last]
     np.testing.assert_allclose(radii, 1.6, rtol=0.005)
     speeds = [now.commands[0, 0, 0] for now in last]

@@ -52,10 +52,9 @@ def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
     away=st.floats(0.5, 9.0),
     bearing=st.floats(-math.pi, math.pi),
     miss=st.floats(-0.6, 0.6),
-    obstacle=st.booleans(),
 )
 def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
-    speed: float, away: float, bearing: float, miss: float, obstacle: bool
+    speed: float, away: float, bearing: float, miss: float
 ) -> None:
     """Against the intersection of a straight line with a circle."""
     batch = posse.batch(num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5, horizon=30)

@@ -84,10 +84,10 @@ def test_a_file_goes_by_the_name_on_its_card(files: list[str], tmp_path: Path) -
     assert [contender.label for contender in found] == [files[0], "any-0"]
 
 
-def learned(seed: int, trained: str = "train") -> LearnedPolicy:
+def learned(seed: int) -> LearnedPolicy:
     """A network of any numbers, for the layout of ``constant``."""
     policy = policy_for(posse.ObservationLayout(posse.get_scenario("constant")), "plain", seed=seed)
-    return policy.with_card({"name": f"any-{seed}", "trained_splits": [trained]})
+    return policy.with_card({"name": f"any-{seed}", "trained_splits": ["train"]})
 
 
 @pytest.fixture

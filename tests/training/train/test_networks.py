@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import ALGORITHM_CASES, HORIZON, quiet, small
+from tests.support.runs import HORIZON, quiet, small
 
 import posse
 from posse_baselines import BasePolicy
@@ -114,7 +114,9 @@ def test_imitation_copies(tmp_path: Path) -> None:
     np.testing.assert_allclose(normaliser.mean, statistics.mean, rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHM_CASES)
+@pytest.mark.parametrize(
+    "algorithm", ["ppo", "mappo", *(pytest.param(name, marks=pytest.mark.long) for name in ("sac", "td3"))]
+)
 def test_what_is_exported_acts_as_the_model_does(tmp_path: Path, algorithm: str) -> None:
     settings = small(tmp_path, algorithm)
     train(settings, console=quiet())

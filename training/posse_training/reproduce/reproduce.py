@@ -20,6 +20,7 @@ import posse
 from posse_baselines import Trajectory
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import write_atomically
+from posse_training.errors import SettingsError
 from posse_training.reproduce import runs
 from posse_training.reproduce.figures import curves, frames, leader_loss, tracks
 from posse_training.reproduce.runs import SPEED_TOLERANCE, SPLIT, TOLERANCE
@@ -74,6 +75,8 @@ def reproduce(out: Path = Path("runs/paper"), starts: int = 200, seed: int = 7) 
         starts: Number of drawn starts; figures show the run with the median settling time.
         seed: Seed of the starts, in the test split.
     """
+    if starts < 1:
+        raise SettingsError(f"starts={starts} must be at least 1")
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     poses = runs.draw_starts(scenario, starts, seed)
     out.mkdir(parents=True, exist_ok=True)
