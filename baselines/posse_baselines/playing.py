@@ -152,7 +152,7 @@ class Recorder:
             observations, rewards = every.observations, every.rewards
             terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
         notes = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
-        rows = {
+        rows: dict[str, Array] = {
             "score": infos["score"],
             "rewards": rewards,
             "actions": np.array(actions, np.float32),
