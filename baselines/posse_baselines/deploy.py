@@ -14,11 +14,14 @@ class deploy:  # noqa: N801 (used as a function is)
     """A policy that drives one robot, memory inside.
 
     Args:
-        policy: The policy; one that reads the state of the worlds is a ``PolicyError``.
+        policy: The policy.
         robot: The robot; its scenario needs a ``message_size`` of at least the policy's.
 
     Attributes:
         row: (F,) the robot's last observation.
+
+    Raises:
+        PolicyError: The policy reads the state of the worlds, or does not fit the robot's scenario.
     """
 
     def __init__(self, policy: Policy, robot: Robot) -> None:

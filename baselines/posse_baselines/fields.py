@@ -52,7 +52,7 @@ def _text(number: float) -> str:
 
 
 def check(settings: Any) -> None:
-    """Raise a ValueError for the first field of a settings object that is not as it declares itself."""
+    """Raise ValueError if a field of a settings object has a value that its declaration does not allow."""
     for field in dataclasses.fields(settings):
         name, value, meta = field.name, getattr(settings, field.name), field.metadata
         choices = meta.get("choices", (value,))

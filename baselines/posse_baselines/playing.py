@@ -152,9 +152,14 @@ class Recorder:
             observations, rewards = every.observations, every.rewards
             terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
         notes = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
-        ends = {"terminated": terminated, "truncated": truncated}
-        self._keep({"score": infos["score"], "rewards": rewards, "actions": np.array(actions, np.float32), **ends})
-        self._keep(terms | notes)
+        rows: dict[str, Array] = {
+            "score": infos["score"],
+            "rewards": rewards,
+            "actions": np.array(actions, np.float32),
+            "terminated": terminated,
+            "truncated": truncated,
+        }
+        self._keep(rows | terms | notes)
         self._keep_frame(observations)
         return done
 
@@ -166,7 +171,7 @@ class Recorder:
         self._keep({"observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
-        """Keep of these rows what is to be recorded, by its name or that of its group, before the slash."""
+        """Keep the rows that were asked for by name, or by the part of the name before the slash."""
         for name, row in rows.items():
             if name.partition("/")[0] in self._names:
                 self._rows[name].append(row)

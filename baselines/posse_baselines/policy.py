@@ -84,7 +84,7 @@ class BasePolicy:
     reads_state: bool = False
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds, here the layout; PolicyError if its messages are too small."""
+        """Return the memory of ``num_worlds`` worlds, the layout; PolicyError if the messages are too short."""
         available = layout.scenario.message_size
         if available < self.message_size:
             raise PolicyError(
@@ -132,7 +132,7 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy for a batch, which one with ``reads_state = True`` is given."""
+    """Return the memory of a policy for a batch; a policy with ``reads_state = True`` first gets the batch."""
     if policy.reads_state and isinstance(policy, StateReader):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)

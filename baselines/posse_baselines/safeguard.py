@@ -43,10 +43,10 @@ class Guard(OwnArrays):
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
-        minds: What it remembers, of another script; default: of ``ddcs-tuned``.
+        minds: Memory of the script whose safeguard it is; default: a new one of ``ddcs-tuned``.
 
     Attributes:
-        minds: What it remembers.
+        minds: Memory of the script.
         inputs: (E, R, k): what a network reads of it; here nothing, k = 0.
     """
 
@@ -69,7 +69,10 @@ class Guard(OwnArrays):
         self.minds.restart(mask)
 
     def actions(self, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions that carry out wanted velocities, both (E, R, 2 + m), safely; once a control step."""
+        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
+
+        Call it once a control step; ValueError if a wanted velocity is not finite.
+        """
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")
@@ -84,7 +87,7 @@ class Guard(OwnArrays):
 def check_adviser(policy: Policy | None, *, believes: bool) -> int:
     """Return how many numbers a network reads in addition to its encoding, with an adviser or without.
 
-    PolicyError if the adviser is none of the DDCS, or there is none whose belief could be read.
+    PolicyError if the adviser is not a policy of the DDCS, or if a belief is to be read without an adviser.
     """
     if policy is None and believes:
         raise PolicyError("a policy that reads an adviser's belief needs an adviser")

@@ -64,7 +64,7 @@ def tuned_files(name: str) -> dict[str, Path]:
 
 
 def read_tuned(path: Path) -> TunedDDCS:
-    """Return the policy of a file of tuned settings; PolicyError if it is missing, damaged or has impossible ones."""
+    """Return the policy of a file of tuned settings; PolicyError if it is missing, damaged or not such a file."""
     try:
         card = read_json(path)
         policy, scenario, values = card["policy"], card["scenario"], card["settings"]

@@ -184,12 +184,13 @@ class Registry(dict[str, D]):
 
         Args:
             function: The function.
-            **options: Further attributes of the declaration; default of its name: that of the function.
+            **options: Further attributes of the declaration; its name is by default that of the function.
 
         Raises:
             DeclarationError: The declaration is invalid, or its name is taken.
         """
-        made = self.make(function=function, **{"name": getattr(plain(function), "__name__", ""), **options})
+        options.setdefault("name", getattr(plain(function), "__name__", ""))
+        made = self.make(function=function, **options)
         taken = self.get(made.name)
         if taken is not None and _home(taken.function) != _home(function):
             raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")

@@ -1,4 +1,4 @@
-"""The baseline, PNGL + l-φ: one control step, in order, and the settings that make it and its family.
+"""The baseline, PNGL + l-φ: its policy, its settings and those of its family, and one control step in order.
 
 A step of one tracker is :func:`propose`, monitoring and tracking, then :func:`carry_out`, actuation. Between the two, a
 wanted velocity may be corrected: before the safeguard, so that a corrected team avoids contact as well as the team

@@ -107,7 +107,8 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         half_height=_F(half_height),
         sight=_F(min(scenario.sensing_range / unit, _MOST_SIGHT)),  # how far its target sensor reaches, m
         searches=_I(math.isfinite(scenario.sensing_range)),  # 1: it may have to be searched for
-        unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),  # 1: an observation has no place for some
+        # 1: more team-mates than places in an observation
+        unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         area_x=_F(min(half_width, _OPEN_AREA)),  # half the width of the rectangle that is to be searched, m
         area_y=_F(min(half_height, _OPEN_AREA)),  # half its height

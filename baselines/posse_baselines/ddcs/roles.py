@@ -65,7 +65,7 @@ def position_of(team: Team, me: Record, mates: Records, j: int) -> complex:
 
 @compiled
 def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]:
-    """Return the working tracker that is nearest to the target, another one than the leader or itself; its distance."""
+    """Return the working tracker nearest to the target, this one or one that does not lead, and its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
         if j != me.leader and is_there(team, me, mates[j]):

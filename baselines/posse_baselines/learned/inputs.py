@@ -133,9 +133,8 @@ class Encoding:
         known = {f.name: f for f in layout.fields}
         for mine in self.fields:
             theirs = known.get(mine.name)
-            most = (
-                math.inf if mine.name == "neighbour_message" else mine.size
-            )  # surplus numbers of messages are left out
+            # Surplus numbers of messages are left out.
+            most = math.inf if mine.name == "neighbour_message" else mine.size
             if theirs and theirs.unit == mine.unit and mine.size <= theirs.size <= most:
                 continue
             found = f"{theirs.size} x {theirs.unit!r}" if theirs else "no such field"

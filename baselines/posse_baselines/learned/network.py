@@ -23,7 +23,10 @@ class Network(OwnArrays):
     """A network with its input normalisation, all float32.
 
     x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
-    the activation between them; ``output`` brings the result into [-1, 1]. PolicyError if that is impossible.
+    the activation between them; ``output`` brings the result into [-1, 1].
+
+    Raises:
+        PolicyError: An unknown function, layers that do not follow one another, or a number that is not finite.
     """
 
     mean: FloatArray
@@ -40,14 +43,15 @@ class Network(OwnArrays):
                 f"unknown activation {self.activation!r:.80} or output {self.output!r:.80}: "
                 f"known are {', '.join(ACTIVATIONS)} and {', '.join(OUTPUTS)}"
             )
-        shapes = {name: array.shape for name, array in self.tensors().items()}
-        sizes = [self.inputs, *map(len, self.biases)]
-        wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("normaliser.mean", "normaliser.scale"), (self.inputs,))
+        if not self.weights or len(self.weights) != len(self.biases):
+            raise PolicyError("a network needs as many biases as weights, at least one of each")
+        sizes = [self.mean.size, *(bias.size for bias in self.biases)]
+        wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("normaliser.mean", "normaliser.scale"), (self.mean.size,))
         for k, (before, after) in enumerate(pairwise(sizes)):
             wanted |= {f"layers.{k}.weight": (after, before), f"layers.{k}.bias": (after,)}
-        if not self.weights or shapes != wanted:
-            raise PolicyError(f"arrays of shapes {shapes} are no layers one after the other, from {self.inputs} inputs")
-        for array in self.tensors().values():
+        for name, array in self.tensors().items():
+            if array.shape != wanted[name]:
+                raise PolicyError(f"{name} has shape {array.shape}, not {wanted[name]}: layers must follow one another")
             if array.dtype != np.float32 or not np.isfinite(array).all():
                 raise PolicyError("a network's numbers must be finite float32")
         if not 0 < self.limit < math.inf:

@@ -34,7 +34,7 @@ class OpenLoop:
     """A target's policy that is a function of time.
 
     Attributes:
-        name: Its name.
+        name: One of :data:`OPEN_LOOP`.
     """
 
     name: str

@@ -218,7 +218,7 @@ class Planner(BasePolicy):
         self._batch = batch
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the batch that is watched; PolicyError if there is none, or it is another one."""
+        """Return the memory for the watched batch; PolicyError if no batch, or one of other worlds, is watched."""
         super().begin(layout, num_worlds)
         batch = self._batch
         if batch is None or batch.num_worlds != num_worlds or batch.scenario != layout.scenario:

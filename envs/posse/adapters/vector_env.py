@@ -104,7 +104,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         return observations[:, self._rows], own, terminated, truncated, infos
 
     def _read(self, actions: Any) -> FloatArray:
-        """Return actions as the batch takes them, whose range is not checked."""
+        """Return actions in the shape of the batch; their range is not checked."""
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
         return motions.reshape(self.batch.action_shape)
 

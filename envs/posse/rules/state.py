@@ -192,7 +192,7 @@ class Fix(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """The last messages that eight trackers received from a team-mate; its motion as in :class:`Pose`."""
+    """The last messages that eight trackers received from a team-mate; the first six fields are those of a pose."""
 
     x: Lanes
     y: Lanes

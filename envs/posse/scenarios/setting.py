@@ -173,5 +173,5 @@ class Setting:
 
 
 def setting(default: Any, meaning: str, *declared: Any, compare: bool = True, **more: Any) -> Any:
-    """Return a dataclass field with this default and declaration, :class:`Setting` but for its kind."""
+    """Return a dataclass field that declares a :class:`Setting`, whose kind is the field's annotation."""
     return field(default=default, compare=compare, metadata={"setting": partial(Setting, meaning, *declared, **more)})

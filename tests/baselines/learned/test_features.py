@@ -7,13 +7,14 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.learned import observations_of, policy_for
+from tests.support.learned import network_for, observations_of, policy_for
 from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
 from posse_baselines.learned import Encoder, Encoding, Network
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
+from posse_baselines.policy import PolicyError
 
 
 def test_names_are_those_of_views() -> None:
@@ -116,3 +117,12 @@ def test_actions_are_the_networks_output(kind: str, activation: str, output: str
     np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(actions).max() <= 1
     assert np.ptp(actions) > 0.5  # the networks say something
+
+
+def test_a_network_names_the_layer_that_does_not_follow() -> None:
+    first, second, bias = (np.zeros(shape, np.float32) for shape in ((4, 3), (2, 5), (4,)))
+    biases = bias, bias[:2]
+    with pytest.raises(PolicyError, match="as many biases as weights"):
+        network_for(3, weights=(first,), biases=biases)
+    with pytest.raises(PolicyError, match=r"layers.1.weight has shape \(2, 5\), not \(2, 4\)"):
+        network_for(3, weights=(first, second), biases=biases)
