@@ -56,6 +56,11 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.keep > self.look_ahead:
+            raise ValueError(
+                f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "
+                "after it was not played ahead"
+            )
 
 
 class Search(OwnArrays):

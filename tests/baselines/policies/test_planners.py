@@ -24,6 +24,11 @@ def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.f
     return rollout(batch, planner, ["actions"], steps=steps)["actions"]
 
 
+def test_what_is_kept_must_have_been_played_ahead() -> None:
+    with pytest.raises(ValueError, match=r"keep=5\.0 must be at most look_ahead=4\.0"):
+        PlannerSettings(keep=5.0)
+
+
 @pytest.mark.long
 def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
     metrics = play(posse.batch("constant", 10, split="train"), Planner(QUICK))
