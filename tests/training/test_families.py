@@ -80,12 +80,12 @@ def test_a_vector_environment_holds_worlds_of_all(autoreset: str) -> None:
     assert observations in env.observation_space
     assert infos["score"].shape == (20,)
     env.action_space.seed(0)
-    before, wrong = [part.batch.arrays.copy() for part in env.parts], np.zeros((20, 2))
+    before, wrong = [batch.arrays.copy() for batch in env.batches], np.zeros((20, 2))
     wrong[-1] = 2
     with pytest.raises(ValueError, match="not a number in"):
         env.step(wrong)
-    for part, arrays in zip(env.parts, before, strict=True):
-        assert all(np.array_equal(*both) for both in zip(part.batch.arrays, arrays, strict=True))
+    for batch, arrays in zip(env.batches, before, strict=True):
+        assert all(np.array_equal(*both) for both in zip(batch.arrays, arrays, strict=True))
     for _ in range(OPEN.horizon):
         observations, rewards, _, truncated, infos = env.step(env.action_space.sample())
         assert rewards.shape == (20,)

@@ -6,8 +6,8 @@ import gymnasium
 import pettingzoo
 
 _GYMNASIUM = {
-    "posse/Team-v0": ("posse.adapters.gymnasium_env:TeamEnv", "posse.adapters.vector_env:team_vector"),
-    "posse/Solo-v0": ("posse.adapters.gymnasium_env:SoloEnv", "posse.adapters.vector_env:solo_vector"),
+    "posse/Team-v0": ("posse.adapters.gymnasium_env:TeamEnv", "posse.adapters.vector_env:TeamVectorEnv"),
+    "posse/Solo-v0": ("posse.adapters.gymnasium_env:SoloEnv", "posse.adapters.vector_env:SoloVectorEnv"),
 }
 _PETTINGZOO = "posse/track-v0"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,40 +12,46 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
-from posse.engine.arguments import check_choice, options_of
+from posse.engine.arguments import check_choice, check_count, mask_of, options_of
 from posse.engine.batch import Batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
-from posse.scenarios import Scenario, get_scenario
+from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
 
 
+def joined(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Return the arrays of several batches one after another; that of a single one is not copied."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
 class BatchEnv:
-    """An environment on a batch.
+    """An environment on a batch, or on several side by side.
 
     Args:
-        scenario: Name of a scenario, or a scenario.
-        num_worlds: E.
+        parts: For each batch its scenario, or the name, and its worlds.
         discrete_actions: Whether actions are numbers of :data:`posse.adapters.actions.MOTIONS`.
         clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
         seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Index of the first world within the seed.
+        first_world: Index of the environment's first world within the seed.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
         autoreset: As for :class:`posse.Batch`.
         num_threads: As for :class:`posse.Batch`.
         overrides: Any field of :class:`posse.Scenario`.
 
     Attributes:
-        scenario: Scenario of the worlds.
-        batch: The worlds.
+        batches: The worlds.
+        batch: The first batch, which is usually the only one.
+        scenario: Its scenario.
         layout: Position of each field in an observation.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
 
     Raises:
-        ScenarioError: An unknown scenario, split or mode, or an unknown or invalid setting.
+        ScenarioError: An unknown scenario, split or mode, an unknown or invalid setting, or batches whose observations
+            have different lengths.
         TypeError: ``target_policy`` is not the policy of a target.
     """
 
@@ -57,8 +63,7 @@ class BatchEnv:
 
     def __init__(
         self,
-        scenario: str | Scenario,
-        num_worlds: int,
+        parts: Iterable[tuple[str | Scenario, range]],
         *,
         discrete_actions: bool = False,
         clip_actions: bool = False,
@@ -73,17 +78,28 @@ class BatchEnv:
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.batch = self._make(
-            self._fit(scenario, **overrides),
-            num_worlds,
-            target_policy=target_policy,
-            seed=0 if seed is None else seed,
-            split=split,
-            first_world=first_world,
-            autoreset=autoreset,
-            num_threads=num_threads,
-            clip_actions=clip_actions,
-        )
+        first_world = check_count("first_world", first_world, 0)
+        self.batches = [
+            self._make(
+                self._fit(scenario, **overrides),
+                len(worlds),
+                target_policy=target_policy,
+                seed=0 if seed is None else seed,
+                split=split,
+                first_world=first_world + worlds.start,
+                autoreset=autoreset,
+                num_threads=num_threads,
+                clip_actions=clip_actions,
+            )
+            for scenario, worlds in parts
+        ]
+        shapes = {batch.observation_shape[1:] for batch in self.batches}
+        if len(shapes) > 1:
+            raise ScenarioError(
+                f"worlds side by side need observations of one length, not {sorted(shapes)}: take posse/Solo-v0, or "
+                "give the family one num_trackers"
+            )
+        self.batch = self.batches[0]
         self.scenario: Scenario = self.batch.scenario
         self.layout: ObservationLayout = self.batch.layout
         self.render_mode = render_mode
@@ -91,19 +107,20 @@ class BatchEnv:
         self.metadata = {**type(self).metadata, "render_fps": fps}  # type: ignore[misc]
         self._discrete = discrete_actions
         self._seeded = seed is not None
-        self._renderer: Any = None
+        self._renderers: dict[int, Any] = {}
 
     def _make(self, scenario: Scenario, num_worlds: int, target_policy: TargetPolicy | None, **settings: Any) -> Batch:
         """Return the worlds."""
         return batch(scenario, num_worlds, target_policy=target_policy, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
+        return {**self.__dict__, "_renderers": {}}
 
     def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Return the spaces of an agent's observations and actions."""
         scenario = self.scenario.replace(message_size=self.batch.action_shape[2] - 2)
-        observation, action = box(*self.layout.bounds()), single_action_space(scenario, self._discrete)
+        low, high = np.stack([batch.layout.bounds() for batch in self.batches], axis=1)  # (batches, F) each
+        observation, action = box(low.min(axis=0), high.max(axis=0)), single_action_space(scenario, self._discrete)
         if isinstance(self._rows, int):
             return observation, action
         return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
@@ -112,40 +129,50 @@ class BatchEnv:
         """Start episodes, of an arbitrary seed if none was ever given, and return the observations (E, rows, F)."""
         if seed is None and not self._seeded:
             seed = secrets.randbits(32)
-        observations = self.batch.reset(seed=seed, options=options)
+        given = options_of(options)
+        masks = self._split(mask_of(given, sum(batch.num_worlds for batch in self.batches)))
+        observations = [
+            batch.reset(seed=seed, options={**given, "reset_mask": mask})
+            for batch, mask in zip(self.batches, masks, strict=True)
+        ]
         self._seeded = True
         self._show()
-        return observations
+        return joined(observations)
+
+    def _split(self, values: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Return each batch's part of values (E, ...) of all worlds."""
+        return np.split(values, np.cumsum([batch.num_worlds for batch in self.batches[:-1]]))
 
     def _show(self) -> None:
         """Draw the first world in the window, in the mode "human"."""
         if self.render_mode == "human":
-            self._draw(0)
+            self._draw()
 
-    def _draw(self, world: int) -> npt.NDArray[np.uint8] | None:
-        """Draw the current state of a world: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
-        self.batch.check_started("render")
+    def _draw(self, number: int = 0, world: int = 0) -> npt.NDArray[np.uint8] | None:
+        """Draw the current state of a world of a batch: (H, W, 3) uint8 in the mode "rgb_array", or in a window."""
+        batch = self.batches[number]
+        batch.check_started("render")
         if self.render_mode is None:
             return None
-        if self._renderer is None:
+        if number not in self._renderers:
             from posse.rendering.renderer import Renderer  # imports pygame
 
-            self._renderer = Renderer(self.scenario, self.render_mode)
-        picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch, world=world)
+            self._renderers[number] = Renderer(batch.scenario, self.render_mode)
+        picture: npt.NDArray[np.uint8] | None = self._renderers[number].draw(batch, world=world)
         return picture
 
-    def close(self) -> None:
+    def close(self, **kwargs: Any) -> None:
         """Close the window, if there is one; may be called again."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        for renderer in self._renderers.values():
+            renderer.close()
+        self._renderers.clear()
 
 
 class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
-        super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
+        super().__init__([(scenario, range(1))], autoreset="disabled", num_threads=1, **settings)
         self._no_info: dict[str, Any] = dict.fromkeys(self.batch._info, 0.0)
         self._rewards = self.batch._rewards
         self._breakable = self.scenario.breaks > 0
@@ -173,7 +200,7 @@ class WorldEnv(BatchEnv):
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
-        return self._draw(0)
+        return self._draw()
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start an episode and return the agents' observations (..., F)."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.engine.kernels import MOST_ACTION, all_in_box
-from posse.numeric import FloatArray
+from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario, ScenarioError
 
 MOST: Final = 2**63
@@ -37,6 +37,17 @@ def options_of(options: object) -> dict[str, Any]:
     if options is not None and not isinstance(options, Mapping):
         raise ValueError(f"options must be a dictionary by name, or None, got {reprlib.repr(options)}")
     return dict(options or {})
+
+
+def mask_of(options: Mapping[str, Any], num_worlds: int) -> BoolArray:
+    """Return which worlds a reset with these options starts, (E,), or raise ValueError."""
+    mask = options.get("reset_mask")
+    chosen = np.ones(num_worlds, np.bool_) if mask is None else np.asarray(mask)
+    if chosen.dtype != np.bool_ or chosen.shape != (num_worlds,):
+        raise ValueError(
+            f"reset_mask must be a bool array of shape ({num_worlds},), got {chosen.dtype} of shape {chosen.shape}"
+        )
+    return chosen
 
 
 def real_numbers(

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of
+from posse.engine.arguments import as_float32, check_choice, check_count, in_box, mask_of, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
     START,
@@ -282,7 +282,9 @@ class Batch(OwnArrays):
             if key not in _OPTIONS:
                 raise ValueError(f"unknown option {reprlib.repr(key)}; options are: {', '.join(_OPTIONS)}")
         new_seed = self.seed if seed is None else check_count("seed", seed, 0)
-        chosen = self._chosen(given.get("reset_mask"))
+        chosen = mask_of(given, self.num_worlds)
+        if not self._started and not chosen.all():
+            raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         poses = poses_of(given, self.scenario, self.num_worlds)
         before, over, world = self.arrays.copy(), self._over, self.arrays.world
         if seed is not None or not self._started:
@@ -304,20 +306,6 @@ class Batch(OwnArrays):
             raise
         self.seed, self._started = new_seed, True
         return observations
-
-    def _chosen(self, mask: npt.ArrayLike | None) -> BoolArray:
-        """Return which worlds a reset starts, (E,)."""
-        if mask is None:
-            return np.ones(self.num_worlds, np.bool_)
-        chosen = np.asarray(mask)
-        if chosen.dtype != np.bool_ or chosen.shape != (self.num_worlds,):
-            raise ValueError(
-                f"reset_mask must be a bool array of shape ({self.num_worlds},), "
-                f"got {chosen.dtype} of shape {chosen.shape}"
-            )
-        if not self._started and not chosen.all():
-            raise ResetNeeded("the first reset starts every world: call it without reset_mask")
-        return chosen
 
     def _place(self, poses: Mapping[str, npt.NDArray[np.float64]], chosen: BoolArray) -> None:
         """Set poses in the chosen worlds, and check them by the rules of a drawn start."""
