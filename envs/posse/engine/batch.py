@@ -105,7 +105,7 @@ class Batch(OwnArrays):
         self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
-        self.term_names = declarations_for(scenario).term_names
+        self.term_names = tuple(term.name for term in declarations_for(scenario).reward_terms)
         self._rewards = tuple((f"reward/{name}", k) for k, name in enumerate(self.term_names))
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)

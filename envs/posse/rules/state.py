@@ -55,17 +55,13 @@ def _whole_arcs(s: Scenario) -> bool:
     return turn <= 1.0 and unlimited and s.actuator_lag == 0
 
 
-def _followed(s: Scenario) -> float:
-    """Return the share of a command that speed and turn rate come nearer in a physics step."""
-    return 1 - math.exp(-s.physics_step / s.actuator_lag) if s.actuator_lag > 0 else 1.0
-
-
 def _measured(s: Scenario) -> bool:
     return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
 
 
-def _smoothing(s: Scenario) -> float:
-    return 1 - math.exp(-s.control_step / s.velocity_smoothing) if s.velocity_smoothing > 0 else 1.0
+def _share(time: float, constant: float) -> float:
+    """Return the share by which a first-order lag of a time constant comes nearer to its goal in a time."""
+    return 1 - math.exp(-time / constant) if constant > 0 else 1.0
 
 
 _Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
@@ -94,7 +90,7 @@ DERIVED: Final[_Numbers] = {
     "drifts": (_I, lambda s: s.drifts),
     "position_step": (_F, lambda s: s.odometry_drift * math.sqrt(s.control_step)),
     "heading_step": (_F, lambda s: s.heading_drift * math.sqrt(s.control_step)),
-    "followed": (_F, _followed),
+    "followed": (_F, lambda s: _share(s.physics_step, s.actuator_lag)),
     "fastest": (_F, lambda s: max(s.tracker_speeds)),
     "speed_change": (_F, lambda s: min(s.tracker_acceleration * np.float32(s.physics_step), FAR)),
     "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * np.float32(s.physics_step), FAR)),
@@ -110,7 +106,7 @@ DERIVED: Final[_Numbers] = {
     "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
     "view_cosine": (_F, lambda s: math.cos(s.field_of_view / 2)),
     "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0),
-    "smoothing": (_F, _smoothing),
+    "smoothing": (_F, lambda s: _share(s.control_step, s.velocity_smoothing)),
 }
 """What kernels read of a scenario beside its numbers: type and value."""
 

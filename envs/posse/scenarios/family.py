@@ -92,9 +92,10 @@ class Family:
         if index < 0:
             fail("index", index, "it must be at least 0")
         shares = np.random.default_rng([seed, *split.encode(), index]).random(len(self.ranges))
-        values = {
-            name: _within(bounds, float(share)) for (name, bounds), share in zip(self.ranges, shares, strict=True)
-        }
+        values: dict[str, float] = {}
+        for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):
+            whole = isinstance(low, int) and isinstance(high, int)
+            values[name] = low + int(share * (high - low + 1)) if whole else low + share * (high - low)
         return self.base.replace(**values)
 
     def replace(self, **changes: Any) -> Family:
@@ -125,14 +126,6 @@ def _check_range(name: str, bounds: Range) -> None:
         known[name].accept(name, value)
     if bounds[0] > bounds[1]:
         fail(name, bounds, "the least must not be above the greatest")
-
-
-def _within(bounds: Range, share: float) -> float:
-    """Return the value of a range at a share of it; a whole number between whole numbers."""
-    low, high = bounds
-    if isinstance(low, int) and isinstance(high, int):
-        return low + int(share * (high - low + 1))
-    return low + share * (high - low)
 
 
 def family(base: str | Scenario | Family, /, *, name: str | None = None, **settings: Any) -> Family:

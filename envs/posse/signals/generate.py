@@ -20,7 +20,6 @@ from posse.declarations import (
     REWARD_TERMS,
     SENSORS,
     TARGET_MOTIONS,
-    Declaration,
     FieldDeclaration,
     Function,
     Metric,
@@ -45,15 +44,6 @@ class Declarations(NamedTuple):
     sensors: tuple[Sensor, ...]
     metrics: tuple[Metric, ...]
     reward_terms: tuple[RewardTerm, ...]
-
-    @property
-    def term_names(self) -> tuple[str, ...]:
-        """Names of the reward terms."""
-        return tuple(term.name for term in self.reward_terms)
-
-    def added(self) -> list[Declaration]:
-        """Return the declarations of users' modules."""
-        return [each for group in self for each in group if not each.built_in]
 
 
 def declarations_for(scenario: Scenario) -> Declarations:
