@@ -32,7 +32,7 @@ from posse.numeric import (
     stamp,
 )
 from posse.rules.contact import meet
-from posse.rules.discs import find_gaps, lay_out, nonnegative
+from posse.rules.discs import find_gaps, lay_out
 from posse.rules.faults import apply_faults, draw_coming_faults
 from posse.rules.motion import drift, motion
 from posse.rules.randomness import mix
@@ -235,8 +235,8 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     def advance(
         fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
     ) -> int:
-        scratch, over = fixed.scratch[nonnegative(thread)], 0
-        for e in range(nonnegative(first), end, WIDTH):
+        scratch, over = fixed.scratch[thread], 0
+        for e in range(first, end, WIDTH):
             over += advance_worlds(e, min(WIDTH, end - e), fixed, actions, orders, results, made, scratch)
         return over
 

@@ -40,15 +40,9 @@ _MINUS_ONE: Final = np.float32(-1.0)
 
 
 @compiled
-def nonnegative(count: int) -> int:
-    """Assert ``count >= 0``, so that numba drops its negative-index check."""
-    return count & 0x7FFFFFFF
-
-
-@compiled
 def blocks(count: int) -> int:
     """Return the number of blocks for ``count`` discs or beams."""
-    return (nonnegative(count) + (WIDTH - 1)) >> 3
+    return (count + (WIDTH - 1)) >> 3
 
 
 @compiled
@@ -83,14 +77,14 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
     """
     last = count - 1
     rows = (
-        load_fields(records[nonnegative(min(first, last))], offset),
-        load_fields(records[nonnegative(min(first + 1, last))], offset),
-        load_fields(records[nonnegative(min(first + 2, last))], offset),
-        load_fields(records[nonnegative(min(first + 3, last))], offset),
-        load_fields(records[nonnegative(min(first + 4, last))], offset),
-        load_fields(records[nonnegative(min(first + 5, last))], offset),
-        load_fields(records[nonnegative(min(first + 6, last))], offset),
-        load_fields(records[nonnegative(min(first + 7, last))], offset),
+        load_fields(records[min(first, last)], offset),
+        load_fields(records[min(first + 1, last)], offset),
+        load_fields(records[min(first + 2, last)], offset),
+        load_fields(records[min(first + 3, last)], offset),
+        load_fields(records[min(first + 4, last)], offset),
+        load_fields(records[min(first + 5, last)], offset),
+        load_fields(records[min(first + 6, last)], offset),
+        load_fields(records[min(first + 7, last)], offset),
     )
     return transpose(rows)
 
@@ -120,7 +114,7 @@ def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
 @compiled
 def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Write the positions of all discs: trackers, then the target, then obstacles."""
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     for block in range(blocks(n + 1)):
         j = WIDTH * block
         pose = Pose(*columns(trackers, j, n, POSE))
@@ -128,7 +122,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))
         store(s.y, j, choose(tracker, pose.y, choose(target, w.y, FAR)))
-    for k in range(nonnegative(c.num_obstacles)):
+    for k in range(c.num_obstacles):
         o = obstacles[k]
         j = n + 1 + k
         s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
@@ -139,7 +133,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
 @compiled
 def num_discs(c: Record) -> int:
     """Return the number of discs of a world: trackers, the target, obstacles."""
-    return nonnegative(c.num_trackers) + 1 + nonnegative(c.num_obstacles)
+    return c.num_trackers + 1 + c.num_obstacles
 
 
 @compiled
@@ -154,7 +148,7 @@ def find_gaps(c: Record, s: Record) -> None:
 
     Near discs could be touched within the next control step.
     """
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     robots = c.robot_radius + c.robot_radius
     tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.control_step
     target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.control_step
@@ -189,7 +183,7 @@ def find_slots(c: Record, w: Record, first: int, slots: Records, taken: np.uint6
     """
     ahead, left = in_frame(load(s.x, first) - w.x, load(s.y, first) - w.y, w.frame_cos, w.frame_sin)
     nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
-    for slot in range(nonnegative(c.num_trackers)):
+    for slot in range(c.num_trackers):
         if taken & (BIT << np.uint64(slot)) == NO_BITS:
             dx, dy = ahead - slots[slot].x, left - slots[slot].y
             d2 = dx * dx + dy * dy

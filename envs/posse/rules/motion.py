@@ -30,7 +30,7 @@ from posse.numeric import (
     store_fields,
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import FAR, blocks, columns, nonnegative, write_block
+from posse.rules.discs import FAR, blocks, columns, write_block
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.randomness import DRIFT, normal_pair
 from posse.rules.state import NEVER, POSE, Pose, WorldArrays
@@ -64,10 +64,10 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s
     The other robots cannot block them.
     """
     near = 0
-    for i in range(nonnegative(c.num_trackers)):
+    for i in range(c.num_trackers):
         t = trackers[i]
         s.near[near], s.near_x[near], s.near_y[near] = np.float32(i), t.x, t.y
-        near = nonnegative(near + (t.near != 0))
+        near += t.near != 0
     s.near_x[near], s.near_y[near] = w.x, w.y
     store(s.near_x, near + 1, eight(FAR))
     store(s.near_y, near + 1, eight(FAR))
@@ -75,7 +75,7 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s
         if w.near != 0:
             move_swept(c, w, near, near + 1, obstacles, s)
         for k in range(near):
-            i = nonnegative(int(s.near[k]))
+            i = int(s.near[k])
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
@@ -108,7 +108,7 @@ def command(
 @compiled
 def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray, s: Record) -> None:
     """Write the motions to execute now: those of the actions, or the ones of ``command_delay`` steps ago."""
-    for i in range(nonnegative(c.num_trackers)):
+    for i in range(c.num_trackers):
         s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
     if c.command_delay > 0:
         kept = command[w.step % c.command_delay]
@@ -120,7 +120,7 @@ def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray
 @compiled
 def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     for block in range(blocks(n)):
         i = WIDTH * block
         pose = Pose(*columns(trackers, i, n, POSE))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
-from posse.rules.discs import blocks, find_slots, nonnegative
+from posse.rules.discs import blocks, find_slots
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NEVER, NO_BITS
 
@@ -27,7 +27,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     for block in range(blocks(n)):
         find_slots(c, w, WIDTH * block, slots, NO_BITS, s)
     taken = NO_BITS

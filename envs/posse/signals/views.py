@@ -38,7 +38,7 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import FAR, columns, nonnegative
+from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (
     CONDITION,
@@ -168,7 +168,7 @@ class Mate(NamedTuple):
 @compiled
 def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: TargetPose) -> View:
     """Return the view of a robot of eight worlds."""
-    i = nonnegative(observers.i)
+    i = observers.i
     if i < c.num_trackers:
         number = eight(np.float32(i))
         own = Pose(*of_worlds(worlds.tracker[:, i], observers, POSE))
@@ -257,7 +257,7 @@ def observe_together(
     c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
     """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     for i in range(n):
         pose = Pose(*columns(worlds.tracker[:, i], first, first + count, POSE))
         store(s.team_x[i], 0, pose.x)
@@ -269,19 +269,19 @@ def observe_together(
         rows = observations[first : first + count, i]
         made.write_own(c, view, s, rows)
         _list_nearest(c, worlds, observers, view, s)
-        start, size = nonnegative(made.width + c.sonar_beams), nonnegative(made.mate_width + c.message_size)
-        for p in range(nonnegative(c.neighbours)):
+        start, size = made.width + c.sonar_beams, made.mate_width + c.message_size
+        for p in range(c.neighbours):
             mate = _mate_in_place(c, worlds, observers, view, p, s)
-            place = rows[:, nonnegative(start + p * size) :]
+            place = rows[:, start + p * size :]
             made.write_mate(c, view, mate, s, place)
             if c.message_size > 0:
-                _write_messages(c, worlds, observers, p, s, place[:, nonnegative(made.mate_width) :])
+                _write_messages(c, worlds, observers, p, s, place[:, made.mate_width :])
 
 
 @compiled
 def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
-    n, places, i = nonnegative(c.num_trackers), nonnegative(c.neighbours), nonnegative(observers.i)
+    n, places, i = c.num_trackers, c.neighbours, observers.i
     for p in range(places):
         store(s.placed[p], 0, eight(-ONE))
         store(s.placed_at[p], 0, eight(FAR))
@@ -290,7 +290,6 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
         if j == observers.i:
             continue
-        j = nonnegative(j)
         if observers.now:
             x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
@@ -300,7 +299,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
         ahead, left = ego(v, x - v.x, y - v.y)
         number = choose(known, np.float32(j), -ONE)
         distance = choose(known, root(ahead * ahead + left * left), FAR)
-        if bits(distance <= load(s.placed_at[nonnegative(places - 1)], 0)) == 0:
+        if bits(distance <= load(s.placed_at[places - 1], 0)) == 0:
             continue
         for p in range(min(n - j, places)):
             other, whose = load(s.placed_at[p], 0), load(s.placed[p], 0)
@@ -346,24 +345,23 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
 @compiled
 def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: Record) -> Lanes:
     """Return eight fields of a lane's mate in a place, of :class:`Pose` or of :class:`Heard`, which begins alike."""
-    e = nonnegative(observers.e + min(lane, observers.number - 1))
-    j = nonnegative(max(int(s.placed[p, lane]), 0))
+    e = observers.e + min(lane, observers.number - 1)
+    j = max(int(s.placed[p, lane]), 0)
     if observers.now:
         return load_fields(worlds.tracker[e, j], POSE)
-    return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
+    return load_fields(worlds.heard[e, observers.i, j], MESSAGE)
 
 
 @out_of_line
 def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int, s: Record, rows: FloatArray) -> None:
     """Write the messages of the mates in a place: none in an empty one, and none to a target."""
-    i = nonnegative(observers.i)
+    i = observers.i
     for lane in range(observers.number):
-        e, number = nonnegative(observers.e + lane), int(s.placed[p, lane])
-        for q in range(nonnegative(c.message_size)):
+        e, number = observers.e + lane, int(s.placed[p, lane])
+        for q in range(c.message_size):
             said = ZERO
             if number >= 0 and i < c.num_trackers:
-                j = nonnegative(number)
-                said = worlds.message[e, 0, j, q] if observers.now else worlds.heard_message[e, i, j, q]
+                said = worlds.message[e, 0, number, q] if observers.now else worlds.heard_message[e, i, number, q]
             rows[lane, q] = said
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from posse.declarations import sensor
 from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, bits, compiled, load, root
-from posse.rules.discs import blocks, nonnegative
+from posse.rules.discs import blocks
 from posse.rules.kinematics import turned
 from posse.rules.randomness import HEADING_NOISE, SENSOR_NOISE, normal_pair
 from posse.rules.state import NEVER
@@ -43,7 +43,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
     In blocks of eight, since single branches would be mispredicted.
     """
     d2 = dx * dx + dy * dy
-    first = nonnegative(c.num_trackers) + 1
+    first = c.num_trackers + 1
     for block in range(blocks(c.num_obstacles)):
         j = first + WIDTH * block
         ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)

@@ -26,7 +26,7 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import FAR, blocks, nonnegative, num_discs, to_wall
+from posse.rules.discs import FAR, blocks, num_discs, to_wall
 from posse.rules.kinematics import in_frame
 
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
@@ -92,21 +92,21 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
         reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
         near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
         while near != 0:
-            disc = nonnegative(j + lowest_bit(near))
+            disc = j + lowest_bit(near)
             if disc != number:
                 ahead, left = in_frame(s.x[disc] - x, s.y[disc] - y, cosine, sine)
                 echo_of_disc(c, ahead, left, s.radius[disc], s)
             near &= near - 1
     if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    for k in range(nonnegative(c.sonar_beams)):
-        o[nonnegative(first + k)] = s.reading[k]
+    for k in range(c.sonar_beams):
+        o[first + k] = s.reading[k]
 
 
 @compiled
 def listen(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
     """Write the sonar rings of all agents of a world to (rows, F), from ``first`` on."""
-    n = nonnegative(c.num_trackers)
+    n = c.num_trackers
     for i in range(n):
         ping(c, trackers[i], i, s, observations[i], first)
     if c.target_agent != 0:
