@@ -41,15 +41,11 @@ from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.senses.sonar import listen
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
-from posse.rules.state import RULES, WorldArrays, config_record, new_scratch, scratch_record, slot_records
+from posse.rules.state import WorldArrays, config_record, new_scratch, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
-from posse.signals.views import OBSERVING, Generated, observe_together
-
-SCRATCH: Final = scratch_record(*RULES, *OBSERVING)
-"""Scratch memory of a thread."""
-
+from posse.signals.views import Generated, observe_together
 
 Orders = npt.NDArray[np.uint8]
 
@@ -67,7 +63,7 @@ class Fixed(NamedTuple):
     """(K,) the same for a target that is an agent."""
     worlds: WorldArrays
     scratch: Records
-    """(threads,) :data:`SCRATCH`."""
+    """(threads,) :data:`posse.rules.state.SCRATCH`."""
 
 
 class Results(NamedTuple):
@@ -209,7 +205,7 @@ def fixed_for(scenario: Scenario, terms: Iterable[RewardTerm], worlds: WorldArra
     """Return the arguments of a scenario with these reward terms; those that it does not weight count 0."""
     given = dict(scenario.reward_weights), dict(scenario.target_reward_weights)
     weights, target_weights = (np.array([each.get(term.name, 0.0) for term in terms], np.float32) for each in given)
-    scratch = new_scratch(SCRATCH, scenario, threads)
+    scratch = new_scratch(scenario, threads)
     return Fixed(config_record(scenario), slot_records(scenario), weights, target_weights, worlds, scratch)
 
 
@@ -223,7 +219,7 @@ def kernel_of(declarations: Declarations) -> Callable[..., int]:
     Raises:
         DeclarationError: A user's function cannot be compiled.
     """
-    check_functions(declarations, SCRATCH)
+    check_functions(declarations)
     return _kernel_of(declarations, stamp(*filter(callable, generated_for(declarations))))
 
 

@@ -133,7 +133,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
 @compiled
 def num_discs(c: Record) -> int:
     """Return the number of discs of a world: trackers, the target, obstacles."""
-    return c.num_trackers + 1 + c.num_obstacles
+    return int(c.num_trackers + 1 + c.num_obstacles)
 
 
 @compiled

@@ -414,9 +414,6 @@ def config_record(scenario: Scenario) -> Records:
     return config
 
 
-Fields = tuple[tuple[str, int | tuple[int, ...]], ...]
-"""Names and shapes."""
-
 TEAM: Final = MAX_TRACKERS
 ROBOTS: Final = TEAM + WIDTH
 """Length of rows of trackers, target and padding."""
@@ -425,7 +422,7 @@ DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
 BEAMS: Final = 64
 _LINE: Final = 16  # float32 of a cache line
 
-RULES: Final[Fields] = (
+_SCRATCH: Final[tuple[tuple[str, int | tuple[int, ...]], ...]] = (
     # Discs: trackers, the target, obstacles.
     ("x", DISCS),  # common frame, m
     ("y", DISCS),
@@ -449,21 +446,26 @@ RULES: Final[Fields] = (
     ("near", ROBOTS),  # numbers of the robots that are near anything, the target last
     ("near_x", ROBOTS + WIDTH),  # their positions
     ("near_y", ROBOTS + WIDTH),
+    # Observations: eight numbers, one for each of eight worlds.
+    ("column", WIDTH),
+    ("team_x", (TEAM, WIDTH)),  # of each tracker
+    ("team_y", (TEAM, WIDTH)),
+    ("placed", (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
+    ("placed_at", (TEAM, WIDTH)),  # its distance, m
 )
-"""What the rules need of it."""
+_PADDING: Final = -sum(math.prod(np.atleast_1d(shape)) for _, shape in _SCRATCH) % _LINE
+
+SCRATCH: Final = np.dtype(
+    (np.record, [(name, _F, np.atleast_1d(shape)) for name, shape in (*_SCRATCH, ("padding", _PADDING))])
+)
+"""Scratch memory of a thread, of whole cache lines, so that no two threads write to one."""
 
 
-def scratch_record(*fields: tuple[str, int | tuple[int, ...]]) -> np.dtype[Any]:
-    """Return the record of scratch memory, of whole cache lines, so that no two threads write to one."""
-    padding = -sum(math.prod(np.atleast_1d(shape)) for _, shape in fields) % _LINE
-    return np.dtype((np.record, [(name, _F, np.atleast_1d(shape)) for name, shape in (*fields, ("padding", padding))]))
-
-
-def new_scratch(record: np.dtype[Any], scenario: Scenario, threads: int) -> Records:
-    """Return scratch memory, a record for each thread, with what is the same in all worlds of a scenario."""
-    memory = np.zeros(threads * record.itemsize + 4 * _LINE, np.uint8)
+def new_scratch(scenario: Scenario, threads: int) -> Records:
+    """Return (threads,) :data:`SCRATCH`, with what is the same in all worlds of a scenario."""
+    memory = np.zeros(threads * SCRATCH.itemsize + 4 * _LINE, np.uint8)
     start = -memory.ctypes.data % (4 * _LINE)
-    scratch = memory[start : start + threads * record.itemsize].view(record)
+    scratch = memory[start : start + threads * SCRATCH.itemsize].view(SCRATCH)
     scratch["index"], scratch["radius"] = np.arange(ROBOTS), scenario.robot_radius
     for name, values in zip(("beam_cos", "beam_sin"), beam_directions(scenario), strict=True):
         scratch[name][:, : scenario.sonar_beams] = values

@@ -15,7 +15,7 @@ from numba.core import types
 from posse.declarations import Function, parameters_of, plain
 from posse.numeric import UNCOMPILED
 from posse.numeric.lanes import LanesType, tuple_of_lanes
-from posse.rules.state import CONFIG, OBSTACLE, SLOT, TRACKER, world_record_of
+from posse.rules.state import CONFIG, OBSTACLE, SCRATCH, SLOT, TRACKER, world_record_of
 from posse.signals.generate import Declarations
 from posse.signals.views import Mate, View
 
@@ -29,13 +29,13 @@ _HEADING: Final = "Failed in nopython mode"
 _LONGEST: Final = 200
 
 
-def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
+def check_functions(declarations: Declarations) -> None:
     """Raise DeclarationError for a user's function that cannot be compiled. Takes some tenths of a second for each."""
     added = [each for group in declarations for each in group if not each.built_in]
     if UNCOMPILED or not added:
         return
     world = world_record_of(declarations.motions, declarations.metrics)
-    records = {"c": CONFIG, "w": world, "t": TRACKER, "s": scratch}
+    records = {"c": CONFIG, "w": world, "t": TRACKER, "s": SCRATCH}
     arrays = {"trackers": TRACKER, "obstacles": OBSTACLE, "slots": SLOT}
     known: dict[str, Any] = {
         **{name: _typeof(np.zeros(1, dtype)[0]) for name, dtype in records.items()},

@@ -10,20 +10,18 @@ last heard.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from posse.numeric import (
     ONE,
     TINY,
-    WIDTH,
     ZERO,
     FloatArray,
     Lanes,
     Mask,
     Record,
-    Records,
     bits,
     choose,
     compiled,
@@ -47,9 +45,7 @@ from posse.rules.state import (
     NEVER,
     POSE,
     TARGET_POSE,
-    TEAM,
     Condition,
-    Fields,
     Fix,
     Heard,
     Odometry,
@@ -58,31 +54,15 @@ from posse.rules.state import (
     WorldArrays,
 )
 
-OBSERVING: Final[Fields] = (
-    # Eight numbers, one for each of eight worlds.
-    ("column", WIDTH),  # of observations
-    ("team_x", (TEAM, WIDTH)),  # of each tracker
-    ("team_y", (TEAM, WIDTH)),
-    ("placed", (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
-    ("placed_at", (TEAM, WIDTH)),  # its distance, m
-)
-"""Fields of a thread's scratch memory used by observations (:mod:`posse.rules.state`)."""
-
 
 class Observers(NamedTuple):
-    """Robot i of ``number`` worlds, at most eight, from world e on."""
+    """Robot i of the worlds ``first`` to ``end``, at most eight."""
 
-    e: int
+    first: int
+    end: int
     i: int
-    number: int
     now: bool
     """Whether they know their team-mates as they are now, not as last heard."""
-
-
-@compiled
-def of_worlds(records: Records, observers: Observers, at: int) -> tuple[Lanes, ...]:
-    """Return a block of fields, ``at`` bytes into the record (E,) of each observer's world, field by field."""
-    return columns(records, observers.e, observers.e + observers.number, at)
 
 
 class View(NamedTuple):
@@ -168,17 +148,17 @@ class Mate(NamedTuple):
 @compiled
 def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: TargetPose) -> View:
     """Return the view of a robot of eight worlds."""
-    i = observers.i
+    first, end, i, _ = observers
     if i < c.num_trackers:
         number = eight(np.float32(i))
-        own = Pose(*of_worlds(worlds.tracker[:, i], observers, POSE))
+        own = Pose(*columns(worlds.tracker[:, i], first, end, POSE))
         if c.drifts != 0:  # its pose as it knows it
-            error = Odometry(*of_worlds(worlds.odometry[:, i], observers, 0))
+            error = Odometry(*columns(worlds.odometry[:, i], first, end, 0))
             cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
             x, y = own.x + error.x, own.y + error.y
             own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
-        fix = Fix(*of_worlds(worlds.tracker[:, i], observers, FIX))
-        condition = Condition(*of_worlds(worlds.tracker[:, i], observers, CONDITION))
+        fix = Fix(*columns(worlds.tracker[:, i], first, end, FIX))
+        condition = Condition(*columns(worlds.tracker[:, i], first, end, CONDITION))
         touching, sees, fixed_at = counts(condition.touching), counts(condition.sees), counts(condition.fix_step)
         working = choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
         per_acceleration, per_turn_acceleration = c.per_acceleration, c.per_turn_acceleration
@@ -264,7 +244,7 @@ def observe_together(
         store(s.team_y[i], 0, pose.y)
     target = TargetPose(*columns(worlds.world, first, first + count, TARGET_POSE))
     for i in range(n + 1 if c.target_agent != 0 else n):
-        observers = Observers(first, i, count, c.perfect_radio != 0 or i == n)
+        observers = Observers(first, first + count, i, c.perfect_radio != 0 or i == n)
         view = view_of(c, worlds, observers, target)
         rows = observations[first : first + count, i]
         made.write_own(c, view, s, rows)
@@ -281,19 +261,20 @@ def observe_together(
 @compiled
 def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
-    n, places, i = c.num_trackers, c.neighbours, observers.i
+    first, end, i, now = observers
+    n, places = c.num_trackers, c.neighbours
     for p in range(places):
         store(s.placed[p], 0, eight(-ONE))
         store(s.placed_at[p], 0, eight(FAR))
     if places == 0:
         return
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
-        if j == observers.i:
+        if j == i:
             continue
-        if observers.now:
+        if now:
             x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
-            heard = Heard(*of_worlds(worlds.heard[:, i, j], observers, MESSAGE))
+            heard = Heard(*columns(worlds.heard[:, i, j], first, end, MESSAGE))
             x, y, sent = heard.x, heard.y, counts(heard.step)
             known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
         ahead, left = ego(v, x - v.x, y - v.y)
@@ -345,7 +326,7 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
 @compiled
 def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: Record) -> Lanes:
     """Return eight fields of a lane's mate in a place, of :class:`Pose` or of :class:`Heard`, which begins alike."""
-    e = observers.e + min(lane, observers.number - 1)
+    e = min(observers.first + lane, observers.end - 1)
     j = max(int(s.placed[p, lane]), 0)
     if observers.now:
         return load_fields(worlds.tracker[e, j], POSE)
@@ -355,13 +336,14 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: 
 @out_of_line
 def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int, s: Record, rows: FloatArray) -> None:
     """Write the messages of the mates in a place: none in an empty one, and none to a target."""
-    i = observers.i
-    for lane in range(observers.number):
-        e, number = observers.e + lane, int(s.placed[p, lane])
+    first, end, i, now = observers
+    for e in range(first, end):
+        lane = e - first
+        number = int(s.placed[p, lane])
         for q in range(c.message_size):
             said = ZERO
             if number >= 0 and i < c.num_trackers:
-                said = worlds.message[e, 0, number, q] if observers.now else worlds.heard_message[e, i, number, q]
+                said = worlds.message[e, 0, number, q] if now else worlds.heard_message[e, i, number, q]
             rows[lane, q] = said
 
 
