@@ -447,7 +447,6 @@ _SCRATCH: Final[tuple[tuple[str, int | tuple[int, ...]], ...]] = (
     ("near_x", ROBOTS + WIDTH),  # their positions
     ("near_y", ROBOTS + WIDTH),
     # Observations: eight numbers, one for each of eight worlds.
-    ("column", WIDTH),
     ("team_x", (TEAM, WIDTH)),  # of each tracker
     ("team_y", (TEAM, WIDTH)),
     ("placed", (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none

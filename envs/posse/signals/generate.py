@@ -78,9 +78,6 @@ def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> st
     return _Module(declarations_for(get_scenario(scenario, **overrides))).text
 
 
-_FEW: Final = 2
-"""Number of columns left over up to which writing each is faster than another transposition."""
-
 _HEAD: Final = '''"""Functions that posse compiles for the declarations of a scenario."""
 
 from numpy import float32
@@ -89,7 +86,6 @@ from posse.numeric import ZERO, choose, compiled, eight
 from posse.rules.discs import write_block
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
-from posse.signals.views import write_column
 
 # The declared functions:'''
 
@@ -110,8 +106,8 @@ class _Module:
         of_mate = [field for field in declarations.fields if field.of_mate]
         summed = [metric for metric in metrics if metric.summed]
         functions = {
-            "write_own(c, v, s, rows)": self._columns(own),
-            "write_mate(c, v, m, s, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
+            "write_own(c, v, rows)": self._columns(own),
+            "write_mate(c, v, m, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
             "reward(c, w, t, weights, values)": self._reward({f"term_{t.name}": t.function for t in terms}),
             "target_reward(c, w, weights, values)": self._reward({f"target_term_{t.name}": t.of_target for t in terms}),
             "draw_motion(c, w)": [
@@ -154,10 +150,7 @@ class _Module:
     def _columns(self, fields: Iterable[FieldDeclaration]) -> Iterator[str]:
         columns: list[str] = []
         width = _size(fields)
-        blocks = [*range(0, width - WIDTH + 1, WIDTH)]
-        if width % WIDTH > _FEW:
-            blocks.append(width - WIDTH)  # repeats columns of the one before
-        single = range(blocks[-1] + WIDTH, width)
+        blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]  # the last one repeats columns of the one before
         for field in fields:
             mine = [f"{field.name}_{q}" for q in range(field.size)]
             yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
@@ -170,7 +163,6 @@ class _Module:
             while blocks and len(columns) >= blocks[0] + WIDTH:
                 first = blocks.pop(0)
                 yield f"write_block(({', '.join(columns[first : first + WIDTH])}), {first}, rows)"
-        yield from (f"write_column({columns[q]}, {q}, s, rows)" for q in single)
 
     def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:
         for k, (name, function) in enumerate(terms.items()):

@@ -2,7 +2,7 @@
 
 A view describes the same robot of eight worlds, one per lane; with fewer worlds the last one is repeated. The generated
 functions (:mod:`posse.signals.generate`) compute its fields. Each gives a *column* of eight numbers, one for each
-world; eight columns are transposed and written to the worlds' rows, those left over one by one.
+world; eight columns are transposed and written to the worlds' rows.
 
 Team-mates follow, nearest first. With a perfect radio, and for a target agent, they are as they are now, otherwise as
 last heard.
@@ -247,13 +247,13 @@ def observe_together(
         observers = Observers(first, first + count, i, c.perfect_radio != 0 or i == n)
         view = view_of(c, worlds, observers, target)
         rows = observations[first : first + count, i]
-        made.write_own(c, view, s, rows)
+        made.write_own(c, view, rows)
         _list_nearest(c, worlds, observers, view, s)
         start, size = made.width + c.sonar_beams, made.mate_width + c.message_size
         for p in range(c.neighbours):
             mate = _mate_in_place(c, worlds, observers, view, p, s)
             place = rows[:, start + p * size :]
-            made.write_mate(c, view, mate, s, place)
+            made.write_mate(c, view, mate, place)
             if c.message_size > 0:
                 _write_messages(c, worlds, observers, p, s, place[:, made.mate_width :])
 
@@ -345,11 +345,3 @@ def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int
             if number >= 0 and i < c.num_trackers:
                 said = worlds.message[e, 0, number, q] if now else worlds.heard_message[e, i, number, q]
             rows[lane, q] = said
-
-
-@compiled
-def write_column(column: Lanes, number: int, s: Record, rows: FloatArray) -> None:
-    """Write one column to rows (number of worlds, ...)."""
-    store(s.column, 0, column)
-    for lane in range(len(rows)):
-        rows[lane, number] = s.column[lane]
