@@ -5,7 +5,7 @@ from __future__ import annotations
 from posse_baselines.ddcs import DDCS
 from posse_baselines.deploy import Deployed, deploy
 from posse_baselines.fields import Tunable, tunables
-from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout
+from posse_baselines.playing import Recorder, Trajectory, batch_for, play, rollout
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -28,7 +28,6 @@ __all__ = [
     "BasePolicy",
     "Deployed",
     "Memory",
-    "Played",
     "Policy",
     "PolicyError",
     "Recorder",
