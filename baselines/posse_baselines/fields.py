@@ -38,8 +38,7 @@ def number(default: float | None, unit: str, low: float, high: float) -> Any:
 
 def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
     """Declare a number that a search may change, and that must exceed the field named ``above`` if there is one."""
-    meta = {"unit": unit, "low": low, "high": high, "above": above}
-    return dataclasses.field(default=default, metadata=meta)
+    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high, "above": above})
 
 
 def _text(number: float) -> str:

@@ -19,7 +19,7 @@ from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.policies.planner import PlannerSettings, Search, actions_of_target
+from posse_baselines.policies.planner import PlannerSettings, Search
 from posse_baselines.policy import Annotations, BasePolicy, Memory
 from posse_baselines.tuned import tuned_settings
 
@@ -136,7 +136,7 @@ class Beliefs(OwnArrays):
 
         ``working`` (R, N): which trackers count as such. Observations are (E, N, F).
         """
-        now, worlds = self.now, self.now.arrays
+        worlds = self.now.arrays
         worlds.write(self._past)
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
         self._advance(self._seen, 0)
@@ -149,9 +149,7 @@ class Beliefs(OwnArrays):
             self._advance(seen, moment)
         self._write(seen, present)
         worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
-        planned = self.search.actions()
-        actions = actions_of_target(now)
-        actions[:, : planned.shape[1]] = planned
+        actions = self.search.actions()
         self._told.played[-1] = actions
         self.step += 1
         return actions[np.arange(self.rows), own, :2]

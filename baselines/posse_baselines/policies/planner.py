@@ -90,13 +90,12 @@ class Search(OwnArrays):
         self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:
-        """Plan in the worlds where it is due; return the trackers' actions (E, N, 2 + m) for the present state."""
+        """Plan in the worlds where it is due; return the actions (E, rows, 2 + m) for the present state."""
         step, worlds = self.batch.worlds["step"], self._when_obeyed()
         due = np.asarray(step % self._keep == 0)
         if due.any():
             self._plan(worlds, due, np.asarray(step // self._keep, np.int64))
-        scenario = self.batch.scenario
-        actions = np.zeros((len(step), scenario.num_trackers, 2 + scenario.message_size), np.float32)
+        actions = actions_of_target(self.batch)
         drive(self.teams, worlds, np.ones(len(step), np.bool_), actions)
         return actions
 
@@ -226,7 +225,7 @@ class Planner(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions for the state that the watched batch is in; observations are not read."""
-        return memory.actions(), memory
+        return memory.actions()[:, : memory.batch.scenario.num_trackers], memory
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Forget the plans of the worlds of a mask (E,)."""
