@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from posse_baselines.ddcs import DDCS
-from posse_baselines.deploy import Deployed, deploy
+from posse_baselines.deploy import deploy
 from posse_baselines.fields import Tunable, tunables
-from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout
+from posse_baselines.playing import Recorder, Trajectory, batch_for, play, rollout
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -26,9 +26,7 @@ register()
 __all__ = [
     "DDCS",
     "BasePolicy",
-    "Deployed",
     "Memory",
-    "Played",
     "Policy",
     "PolicyError",
     "Recorder",

@@ -42,7 +42,3 @@ class deploy:  # noqa: N801 (used as a function is)
         team = np.tile(row, (1, self.robot.scenario.num_trackers, 1))
         actions, self._memory = self.policy.act(team, self._memory)
         return self.robot.command(actions[0, self.robot.number])
-
-
-Deployed = deploy
-"""The type of what :func:`deploy` returns."""

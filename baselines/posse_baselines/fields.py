@@ -38,13 +38,7 @@ def number(default: float | None, unit: str, low: float, high: float) -> Any:
 
 def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
     """Declare a number that a search may change, and that must exceed the field named ``above`` if there is one."""
-    meta = {"unit": unit, "low": low, "high": high, "above": above}
-    return dataclasses.field(default=default, metadata=meta)
-
-
-def choice(default: str, choices: tuple[str, ...]) -> Any:
-    """Declare a field that names one of several laws."""
-    return dataclasses.field(default=default, metadata={"choices": choices})
+    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high, "above": above})
 
 
 def _text(number: float) -> str:
@@ -55,10 +49,8 @@ def check(settings: Any) -> None:
     """Raise ValueError if a field of a settings object has a value that its declaration does not allow."""
     for field in dataclasses.fields(settings):
         name, value, meta = field.name, getattr(settings, field.name), field.metadata
-        choices = meta.get("choices", (value,))
-        if str(field.type).startswith("Literal["):
-            choices = get_args(get_type_hints(type(settings))[name])
-        if value not in choices:
+        is_choice = str(field.type).startswith("Literal[")
+        if is_choice and value not in (choices := get_args(get_type_hints(type(settings))[name])):
             raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
         if "low" not in meta or (value is None and "None" in str(field.type)):
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -191,18 +191,6 @@ def poses_of(state: Mapping[str, Array], who: str) -> Array:
     return np.stack([state[f"{who}_x"], state[f"{who}_y"], heading], axis=-1)
 
 
-class Played(NamedTuple):
-    """One control step of :func:`rollout`.
-
-    Attributes:
-        running: (E,) whether the first episode of each world was in play.
-        memory: The policy's memory, before it acts on the next frame.
-    """
-
-    running: BoolArray
-    memory: Memory
-
-
 def batch_for(
     policy: Policy, scenario: Scenario, num_worlds: int = 1, target: Target | None = None, **settings: Any
 ) -> Batch:
@@ -250,7 +238,7 @@ def rollout(
     steps: int | None = None,
     seed: int | None = None,
     options: Mapping[str, Any] | None = None,
-    after_step: Callable[[Played], object] | None = None,
+    after_step: Callable[[Memory], object] | None = None,
 ) -> Trajectory:
     """Reset a batch, play a policy in it and return what was recorded.
 
@@ -262,7 +250,7 @@ def rollout(
             ended. With autoreset disabled, it ends there in any case.
         seed: As for :meth:`posse.Batch.reset`.
         options: As for :meth:`posse.Batch.reset`.
-        after_step: Called after each step.
+        after_step: Called after each step with the policy's memory.
 
     Raises:
         PolicyError: The policy does not fit the batch, the target is an agent that nothing moves, or episodes end at
@@ -277,7 +265,6 @@ def rollout(
     observations = recorder.reset(seed=seed, options=options)
     begins = np.zeros(batch.num_worlds, np.bool_)
     while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
-        running = ~recorder.over
         actions, memory = policy.act(observations, memory)
         annotations = policy.annotations(memory) if "annotations" in record else None
         observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
@@ -288,7 +275,7 @@ def rollout(
             memory = policy.restart(memory, begins)
         begins = ended
         if after_step is not None:
-            after_step(Played(running, memory))
+            after_step(memory)
         if batch.autoreset == "disabled" and ended.any() and not ended.all():
             raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
     return recorder.trajectory()

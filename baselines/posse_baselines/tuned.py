@@ -30,22 +30,17 @@ class TunedDDCS(DDCS):
     Which shipped file is played depends on the scenario's name alone, whatever else is overridden.
 
     Args:
-        settings: Of the file; of a policy of :data:`TUNED`, those that are played where no file ships.
-        name: Its name.
+        name: Its name; one of :data:`TUNED` if no settings are given.
+        settings: Of the file; default: those that ship.
         card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
-            tuned for, and more; ``None``: those that ship.
+            tuned for, and more.
     """
 
     trained_splits = ("train",)
 
-    def __init__(self, settings: Settings, name: str, card: Mapping[str, Any] | None = None) -> None:
-        super().__init__(settings, name)
+    def __init__(self, name: str, settings: Settings | None = None, card: Mapping[str, Any] | None = None) -> None:
+        super().__init__(settings or FAMILY[TUNED[name]], name)
         self.card: Mapping[str, Any] = card or {}
-
-    @classmethod
-    def of(cls, name: str) -> TunedDDCS:
-        """Return one of :data:`TUNED`."""
-        return cls(FAMILY[TUNED[name]], name)
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings that are played on a scenario."""
@@ -79,4 +74,4 @@ def read_tuned(path: Path) -> TunedDDCS:
         settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
     except (OSError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise PolicyError(f"{path} holds no tuned settings: {type(error).__name__}: {error!s:.1000}") from error
-    return TunedDDCS(settings, f"{policy}-tuned-{scenario}", card)
+    return TunedDDCS(f"{policy}-tuned-{scenario}", settings, card)

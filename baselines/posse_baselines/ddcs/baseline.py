@@ -38,7 +38,7 @@ from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, r
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
-from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, NO_EXCHANGE, SEARCHING, Settings
+from posse_baselines.ddcs.settings import FLOCKING, NO_EXCHANGE, SEARCHING, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
@@ -191,7 +191,7 @@ def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
     monitor(team, me, mates, row)
     look_around(team, me, mates)
     foresee(team, me)
-    if team.settings.model == CENTRALIZED:
+    if team.settings.centralized:
         settle_lead(team, me, mates)
     if me.known == 0:
         me.slot = -1

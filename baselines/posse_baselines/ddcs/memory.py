@@ -117,19 +117,25 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
 
 
 def settings_of(settings: Settings) -> Records:
-    """Return settings as an array of one record.
+    """Return settings as an array of one record: numbers, and of the choices whether each is made.
 
-    A choice is its position among those allowed, ``forbidden`` a table of the transitions from a task (row) to another.
+    ``forbidden`` is a table of the transitions from a task (row) to another.
     """
-    values: dict[str, Any] = {"forbidden": np.zeros((len(TASKS), len(TASKS)), np.int64)}
+    forbidden = np.zeros((len(TASKS), len(TASKS)), np.int64)
     for transition in settings.forbidden:
         before, after = transition.split(">")
-        values["forbidden"][TASKS.index(before), TASKS.index(after)] = 1
-    for field in dataclasses.fields(settings):
-        value, choices = getattr(settings, field.name), field.metadata.get("choices")
-        if field.name != "forbidden":
-            values[field.name] = choices.index(value) if choices else float(value)
-    return _record(**values)
+        forbidden[TASKS.index(before), TASKS.index(after)] = 1
+    values = dataclasses.asdict(settings)
+    return _record(
+        forbidden=forbidden,
+        centralized=settings.model == "centralized",
+        pngl=settings.guidance == "pngl",
+        deviates=settings.deviation != "none",
+        as_occupant=settings.deviation == "occupant",
+        l_l=settings.follower_law == "l-l",
+        by_slot_frame=settings.follower_frame == "slot-frame",
+        **{name: float(value) for name, value in values.items() if isinstance(value, int | float)},
+    )
 
 
 class Team(NamedTuple):

@@ -22,18 +22,7 @@ from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import GRID, Team, is_due, since
 from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.roles import course_of
-from posse_baselines.ddcs.settings import (
-    BY_SLOT_FRAME,
-    CENTRALIZED,
-    CONVERGING,
-    EXCHANGING,
-    FLOCKING,
-    L_L,
-    NO_DEVIATION,
-    OF_OCCUPANT,
-    PNGL,
-    SEARCHING,
-)
+from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, unit, vector, wrap
 
@@ -54,7 +43,7 @@ _LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, bel
 def follows(team: Team, me: Record, mates: Records) -> bool:
     """Return whether a tracker follows the leader, not the target."""
     settings = team.settings
-    if settings.model != CENTRALIZED or me.leader < 0 or me.leader == me.number:
+    if not settings.centralized or me.leader < 0 or me.leader == me.number:
         return False
     leader = mates[me.leader]
     # A silent leader that cannot be replaced is followed at its last known position.
@@ -77,7 +66,7 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
         near, far = settings.near, settings.far
         if follows(team, me, mates):
             error = length(place_by(team, me, mates[me.leader], 0).place - me.position)
-        elif settings.guidance == PNGL:
+        elif settings.pngl:
             near, far = settings.range_near, settings.range_far
             arm = team.slots[me.slot] * me.frame
             error = length(me.target - me.position) - length(arm)
@@ -116,7 +105,7 @@ def move(team: Team, me: Record, mates: Records) -> None:
             slot = steering.slot_velocity(vector(ref.speed, ref.theta), ref.frame_rate, ref.place - ref.position)
             way = ref.place - me.position
             want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration), 0.0)
-    elif settings.guidance == PNGL:
+    elif settings.pngl:
         pursue(team, me)
     else:
         hold_slot(team, me)
@@ -160,17 +149,17 @@ def pursue(team: Team, me: Record) -> None:
     """
     settings, n = team.settings, len(team.slots)
     constant = float(settings.navigation_constant)
-    if settings.model != CENTRALIZED and n > 1:  # K of its own
+    if not settings.centralized and n > 1:  # K of its own
         constant += settings.spread * (2.0 * me.number / (n - 1) - 1.0)
     arm = team.slots[me.slot] * me.frame
     r, sigma = guidance.line_of_sight(me.position, me.target)
     wanted_sigma, wanted_theta, frame_rate = 0.0, 0.0, 0.0
-    if settings.deviation != NO_DEVIATION:
+    if settings.deviates:
         wanted_sigma, wanted_theta, frame_rate = angle_of(-arm), angle_of(me.frame), me.psi_rate
         if me.task == FLOCKING:
             # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
             constant += settings.bearing_gain
-    if settings.deviation == OF_OCCUPANT:
+    if settings.as_occupant:
         wanted_theta = steering.slot_heading(me.target_velocity, me.psi_rate, arm, wanted_theta)
         if me.task == FLOCKING:
             # In front of the target, heading away from it, the bearing turns the other way.
@@ -220,7 +209,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
         speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
         theta = wrap(theta + rate * (age + team.world.lead))
     frame = theta
-    if team.settings.follower_frame == BY_SLOT_FRAME:
+    if team.settings.by_slot_frame:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
     position, _ = mate_now(team, me, mate)
     place = position + (team.slots[me.slot] - team.slots[slot]) * vector(1.0, frame)
@@ -282,7 +271,7 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     offset = team.settings.point_offset
     demand, wanted = demand_by(team, me, mates[me.leader], 0)
     velocity = demand.velocity
-    second = second_of(team, me, mates) if team.settings.follower_law == L_L else -1
+    second = second_of(team, me, mates) if team.settings.l_l else -1
     if second >= 0:
         other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
         velocity = formation.l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)

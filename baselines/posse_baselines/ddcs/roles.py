@@ -27,7 +27,7 @@ import numpy as np
 from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
-from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
+from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
 from posse_baselines.laws.steering import Course, Work, assign, time_to_slot
 
@@ -188,7 +188,7 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
                 time += _TAKEN_COST
             # The leader of the centralized model takes the first slot.
-            if settings.model == CENTRALIZED and me.leader >= 0 and (k == 0) != (j == me.leader):
+            if settings.centralized and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
             cost[j, k] = time + 1e-4 * j
     assign(cost, work.assigning)

@@ -4,22 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from posse_baselines.fields import check, choice, number, tuned
+from posse_baselines.fields import check, number, tuned
 
-MODELS: Final = ("distributed", "centralized")
-GUIDANCE_LAWS: Final = ("slot", "pngl")
-DEVIATIONS: Final = ("none", "slot", "occupant")
-FOLLOWER_LAWS: Final = ("l-phi", "l-l")
-FOLLOWER_FRAMES: Final = ("leader", "slot-frame")
-# A choice as the kernels read it is its position.
-CENTRALIZED: Final = MODELS.index("centralized")
-PNGL: Final = GUIDANCE_LAWS.index("pngl")
-NO_DEVIATION: Final = DEVIATIONS.index("none")
-OF_OCCUPANT: Final = DEVIATIONS.index("occupant")
-L_L: Final = FOLLOWER_LAWS.index("l-l")
-BY_SLOT_FRAME: Final = FOLLOWER_FRAMES.index("slot-frame")
 TASKS: Final = ("searching", "converging", "flocking", "exchange")
 """The four tasks of section 3.1 (:mod:`posse_baselines.ddcs.motion`); a tracker's memory holds the position."""
 SEARCHING, CONVERGING, FLOCKING, EXCHANGING = range(len(TASKS))
@@ -38,23 +26,23 @@ class Settings:
         ValueError: An unknown model, law or transition, or a number out of its range.
     """
 
-    model: str = choice("distributed", MODELS)
+    model: Literal["distributed", "centralized"] = "distributed"
     """``"distributed"``: every tracker is guided by the target (``guidance``); ``"centralized"``:
     only the leader is, the others follow it by ``follower_law``."""
-    guidance: str = choice("slot", GUIDANCE_LAWS)
+    guidance: Literal["slot", "pngl"] = "slot"
     """Law of trackers guided by the target: ``"slot"`` (Cartesian: the slot's velocity and a gain
     on its offset) or ``"pngl"`` (θ = K σ + c, and (13) with a correction of the range)."""
-    deviation: str = choice("slot", DEVIATIONS)
+    deviation: Literal["none", "slot", "occupant"] = "slot"
     """c of PNGL: ``"none"`` (0, as in (5)), ``"slot"`` (ψ - K σ_d) or ``"occupant"`` (the heading
     of the slot's occupant, which differs from ψ while the frame turns, - K σ_d)."""
     navigation_constant: float = tuned(1.0, "", 0.9, 1.1)
     """K of PNGL: of the leader, and the mean of a distributed team."""
     spread: float = number(0.0, "", 0.0, 0.1)
     """By how much K differs from the mean at both ends of a distributed team, η in the paper."""
-    follower_law: str = choice("l-phi", FOLLOWER_LAWS)
+    follower_law: Literal["l-phi", "l-l"] = "l-phi"
     """``"l-phi"`` (distance and direction from the leader) or ``"l-l"`` (from the third robot on,
     the distances from the leader and from a follower before it in the order of the slots)."""
-    follower_frame: str = choice("leader", FOLLOWER_FRAMES)
+    follower_frame: Literal["leader", "slot-frame"] = "leader"
     """Frame in which a follower's φ_d is constant: the leader's heading (figure 6) or the slot
     frame."""
     radio: bool = True

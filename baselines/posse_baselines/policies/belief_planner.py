@@ -8,7 +8,6 @@ corrects the present by what the engine makes of it, and is not rolled forward o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -20,13 +19,16 @@ from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.fields import check, number
-from posse_baselines.policies.planner import PlannerSettings, Search, actions_of_target
+from posse_baselines.policies.planner import PlannerSettings, Search
 from posse_baselines.policy import Annotations, BasePolicy, Memory
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
+_FIX_TRUST: Final = 0.3  # share of the difference between a noisy fix and the believed position that is corrected
+_HEADING_TRUST: Final = 0.1  # the same of noisy headings: the slot frame's, and with it the target's
+_LOST_AFTER: Final = 2.0  # s; age of a fix up to which the planned motion is played, then the script's
+_UNSEEN_DELAY: Final = 30.0  # s; by how much later slots are filled from which the target cannot be seen
 _AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that the target was believed to have
 _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
 _JUMP: Final = 1.0  # m; a fix farther than this from what was believed replaces it
@@ -43,26 +45,6 @@ _SEEN: Final = record_type(
     ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
     ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class BeliefSettings:
-    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata."""
-
-    plan: PlannerSettings = field(default_factory=PlannerSettings)
-    """How far it plays ahead, and what it tries."""
-    fix_trust: float = number(0.3, "", 0.01, 1.0)
-    """Share of the difference between a noisy fix and the believed position that is corrected."""
-    heading_trust: float = number(0.1, "", 0.01, 1.0)
-    """The same of noisy headings: the slot frame's, and with it the target's."""
-    lost_after: float = number(2.0, "s", 0.0, 100.0)
-    """Age of a fix up to which the planned motion is played, then the script's."""
-
-    unseen_delay: float = number(30.0, "s", 0.0, 100.0)
-    """By how much later slots are filled from which the target cannot be seen."""
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class _Told(NamedTuple):
@@ -102,14 +84,14 @@ class Beliefs(OwnArrays):
     """The belief worlds of E teams of N trackers, R = E N, and the search for the best way to play in them.
 
     Args:
-        settings: What is trusted, and how it plans.
+        settings: How it plans.
         layout: Of the observations.
         num_worlds: E.
     """
 
-    def __init__(self, settings: BeliefSettings, layout: ObservationLayout, num_worlds: int) -> None:
+    def __init__(self, settings: PlannerSettings, layout: ObservationLayout, num_worlds: int) -> None:
         scenario = layout.scenario
-        self.settings, self.layout, self.dt = settings, layout, scenario.control_step
+        self.layout, self.dt = layout, scenario.control_step
         self.rows = num_worlds * scenario.num_trackers
         self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
@@ -134,9 +116,9 @@ class Beliefs(OwnArrays):
             np.zeros((*shape[:2], 4), np.complex64),
             np.zeros((window + 1, *self.now.action_shape), np.float32),
         )
-        self.search = Search(settings.plan, self.now)
+        self.search = Search(settings, self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
-        self.search.teams.late[:] = settings.unseen_delay * (np.array(arms) > scenario.sensing_range)
+        self.search.teams.late[:] = _UNSEEN_DELAY * (np.array(arms) > scenario.sensing_range)
         self.restart(np.ones(self.rows, np.bool_))
 
     def restart(self, mask: BoolArray) -> None:
@@ -154,7 +136,7 @@ class Beliefs(OwnArrays):
 
         ``working`` (R, N): which trackers count as such. Observations are (E, N, F).
         """
-        now, worlds = self.now, self.now.arrays
+        worlds = self.now.arrays
         worlds.write(self._past)
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
         self._advance(self._seen, 0)
@@ -167,9 +149,7 @@ class Beliefs(OwnArrays):
             self._advance(seen, moment)
         self._write(seen, present)
         worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
-        planned = self.search.actions()
-        actions = actions_of_target(now)
-        actions[:, : planned.shape[1]] = planned
+        actions = self.search.actions()
         self._told.played[-1] = actions
         self.step += 1
         return actions[np.arange(self.rows), own, :2]
@@ -221,19 +201,19 @@ class Beliefs(OwnArrays):
         here = told.fixed
         place, theta, frame, velocity = told.fix.T.astype(np.complex128)
         gap = (w["step"] - seen["step"]) * self.dt
-        first = gap > self.settings.lost_after
+        first = gap > _LOST_AFTER
         noise = self.layout.scenario.heading_noise
         if noise > 0.0:  # it is the same of both headings, and how the slot frame turns is known
             error = np.angle(frame / (w["frame_cos"] + 1j * w["frame_sin"]))
-            excess = np.exp(-1j * np.where(first, 0.0, (1.0 - self.settings.heading_trust) * error))
-            theta, frame, noise = theta * excess, frame * excess, self.settings.heading_trust * noise
+            excess = np.exp(-1j * np.where(first, 0.0, (1.0 - _HEADING_TRUST) * error))
+            theta, frame, noise = theta * excess, frame * excess, _HEADING_TRUST * noise
         angle = np.angle(theta)
         turn = np.where(gap <= _GAP, _wrap(angle - seen["theta"]) / np.maximum(gap, self.dt), 0.0)
         turn = np.clip(turn, -s.target_turn_rate, s.target_turn_rate)
         surprise = _wrap(angle - np.arctan2(w["heading_sin"], w["heading_cos"]))
         if self.noisy:
             guess = w["x"] + 1j * w["y"]
-            trust = np.where(first | (np.abs(place - guess) > _JUMP), 1.0, self.settings.fix_trust)
+            trust = np.where(first | (np.abs(place - guess) > _JUMP), 1.0, _FIX_TRUST)
             place = guess + trust * (place - guess)
         speed = np.full(self.rows, s.target_speed)
         if s.target_is_agent:
@@ -300,7 +280,7 @@ def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 class _Memory(Minds):
     """Of the trackers as they monitor and search, and what they believe."""
 
-    def __init__(self, plans: BeliefSettings, layout: ObservationLayout, settings: Settings, num_worlds: int) -> None:
+    def __init__(self, plans: PlannerSettings, layout: ObservationLayout, settings: Settings, num_worlds: int) -> None:
         super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
         self.beliefs = Beliefs(plans, layout, num_worlds)
 
@@ -316,12 +296,12 @@ class BeliefPlanner(DDCS):
     ``ddcs-tuned`` does, whose monitoring, messages and safeguard it has in any case.
 
     Args:
-        settings: What it trusts, and how it plans.
+        settings: How far it looks ahead, and what it tries.
     """
 
-    def __init__(self, settings: BeliefSettings | None = None) -> None:
+    def __init__(self, settings: PlannerSettings | None = None) -> None:
         super().__init__(name="belief-planner")
-        self.plans = settings or BeliefSettings()
+        self.plans = settings or PlannerSettings()
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings of ``ddcs-tuned`` for a scenario."""
@@ -368,7 +348,7 @@ class BeliefPlanner(DDCS):
     def _planned(self, memory: Memory) -> BoolArray:
         """Return whether each tracker plays what it planned, (E, N)."""
         beliefs = memory.beliefs
-        return np.asarray(beliefs.age.reshape(memory.me.shape) * beliefs.dt <= self.plans.lost_after)
+        return np.asarray(beliefs.age.reshape(memory.me.shape) * beliefs.dt <= _LOST_AFTER)
 
     def _working(self, minds: Minds) -> BoolArray:
         """Return which trackers each one takes to work and to be in range, (R, N)."""

@@ -33,6 +33,9 @@ _RANGES: Final = {"ahead": (-0.25, 0.25), "left": (-0.2, 0.2), "gain": (0.7, 4.0
 _TRIES: Final = len(_STANDARD) + 1
 """Tries in each round: the standard ways and what was kept; or the best so far, and variations."""
 _REPEAT: Final = 64  # plannings after which the variations repeat
+_VARIED: Final = 0.5  # share of the trackers whose way a variation changes
+_SPREAD: Final = 0.2  # standard deviation of a change, as a share of the range
+_SEED: Final = 0  # of the variations and of what copies draw
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,14 +48,6 @@ class PlannerSettings:
     """How long the best is kept before the next planning."""
     rounds: int = number(2, "", 0, 20)
     """Rounds of variations on the best so far, after the standard ways of playing."""
-    varied: float = number(0.5, "", 0.0, 1.0)
-    """Share of the trackers whose way a variation changes."""
-    spread: float = number(0.2, "", 0.01, 1.0)
-    """Standard deviation of a change, as a share of the range."""
-    distance_cost: float = number(1.0, "1/m", 0.0, 100.0)
-    """What a metre of mean distance from free slots at the end of a try costs, in steps' scores."""
-    seed: int = number(0, "", 0, 2**63 - 1)
-    """Of the variations and of what copies draw."""
 
     def __post_init__(self) -> None:
         check(self)
@@ -82,12 +77,10 @@ class Search(OwnArrays):
         self._copies: Batch | None = None
         self._later: Batch | None = None
         # Variations are drawn once, so that what is tried in a world does not depend on the others.
-        rng = np.random.default_rng(settings.seed)
+        rng = np.random.default_rng(_SEED)
         shape = (_REPEAT, settings.rounds, _TRIES - 1, n)
-        self._changed = rng.random(shape) < settings.varied
-        self._shifts = {
-            name: settings.spread * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()
-        }
+        self._changed = rng.random(shape) < _VARIED
+        self._shifts = {name: _SPREAD * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()}
         self._foresees = rng.random(shape) < 0.5
 
     def restart(self, mask: BoolArray) -> None:
@@ -97,13 +90,12 @@ class Search(OwnArrays):
         self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:
-        """Plan in the worlds where it is due; return the trackers' actions (E, N, 2 + m) for the present state."""
+        """Plan in the worlds where it is due; return the actions (E, rows, 2 + m) for the present state."""
         step, worlds = self.batch.worlds["step"], self._when_obeyed()
         due = np.asarray(step % self._keep == 0)
         if due.any():
             self._plan(worlds, due, np.asarray(step // self._keep, np.int64))
-        scenario = self.batch.scenario
-        actions = np.zeros((len(step), scenario.num_trackers, 2 + scenario.message_size), np.float32)
+        actions = actions_of_target(self.batch)
         drive(self.teams, worlds, np.ones(len(step), np.bool_), actions)
         return actions
 
@@ -112,7 +104,7 @@ class Search(OwnArrays):
         delay = self.batch.scenario.command_delay
         if delay == 0:
             return self.batch
-        self._later = self.batch.copies(1, seed=self.settings.seed, into=self._later)
+        self._later = self.batch.copies(1, seed=_SEED, into=self._later)
         unread = actions_of_target(self._later)
         for _ in range(delay):
             self._later.step(unread)
@@ -125,10 +117,10 @@ class Search(OwnArrays):
         tries = np.concatenate([standard, teams.ways[:, None]], axis=1)
         everyone = np.arange(num_worlds)
         for turn in range(self.settings.rounds + 1):
-            self._copies = worlds.copies(_TRIES, seed=self.settings.seed, alike=True, into=self._copies)
+            self._copies = worlds.copies(_TRIES, seed=_SEED, alike=True, into=self._copies)
             plans = np.repeat(teams.plans, _TRIES, axis=0)
             trying = teams._replace(ways=np.ascontiguousarray(tries.reshape(-1, tries.shape[2])), plans=plans)
-            worth, paths = play_ahead(trying, self._copies, self._steps, self.settings.distance_cost)
+            worth, paths = play_ahead(trying, self._copies, self._steps)
             best = worth.reshape(num_worlds, _TRIES).argmax(axis=1)
             ways = tries[everyone, best]
             if turn < self.settings.rounds:
@@ -152,15 +144,12 @@ class Search(OwnArrays):
         return tries
 
 
-def play_ahead(
-    teams: Teams, copies: Batch, steps: int, distance_cost: float
-) -> tuple[npt.NDArray[np.float64], FloatArray]:
+def play_ahead(teams: Teams, copies: Batch, steps: int) -> tuple[npt.NDArray[np.float64], FloatArray]:
     """Play copies ahead, with commands that act at once; return the worth of each, (C,), and the target's path.
 
     The path is (C, steps + 1, 4).
     The worth is the sum of the scores up to the first contact from now on, less a price for that
-    contact that no score outweighs, less ``distance_cost`` for each metre of the trackers' mean
-    distance from free slots in the end.
+    contact that no score outweighs, less the trackers' mean distance (m) from free slots in the end.
     """
     s: Any = copies.scenario
     world = copies.arrays.world
@@ -183,7 +172,7 @@ def play_ahead(
         worth += np.where(going, infos["score"], 0.0) - 2.0 * steps * touched
         going &= ~(terminated | truncated)
     away = copies.arrays.tracker["slot_distance"].mean(axis=1)
-    return worth - np.where(going, distance_cost * away, 0.0), paths
+    return worth - np.where(going, away, 0.0), paths
 
 
 def actions_of_target(batch: Batch) -> FloatArray:
@@ -236,7 +225,7 @@ class Planner(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions for the state that the watched batch is in; observations are not read."""
-        return memory.actions(), memory
+        return memory.actions()[:, : memory.batch.scenario.num_trackers], memory
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Forget the plans of the worlds of a mask (E,)."""

@@ -10,8 +10,7 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import Planner
-from posse_baselines.policies.pursuit import Pursuit
-from posse_baselines.policies.simple import Idle, Random
+from posse_baselines.policies.simple import Idle, Pursuit, Random
 from posse_baselines.policy import Policy
 from posse_baselines.tuned import TUNED, TunedDDCS
 
@@ -20,7 +19,7 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "idle": Idle,
     "pursuit": Pursuit,
     **{name: partial(DDCS.of, name) for name in FAMILY},
-    **{name: partial(TunedDDCS.of, name) for name in TUNED},
+    **{name: partial(TunedDDCS, name) for name in TUNED},
     "belief-planner": BeliefPlanner,
     "planner": Planner,
 }

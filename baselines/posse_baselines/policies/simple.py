@@ -1,4 +1,4 @@
-"""Lower bounds for comparisons: policies that stand still or act at random."""
+"""Lower bounds for comparisons: policies that stand still, act at random, or go straight at the target."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from posse import ObservationLayout
 from posse.numeric import ONE, FloatArray, kernel
 from posse.rules import mix
-from posse_baselines.policy import BasePolicy, Memory
+from posse_baselines.policy import BasePolicy, Memory, check_observations
 
 _SHIFT: Final = np.uint64(40)
 _TO_BOTH_SIDES: Final = np.float32(2.0**-23)
+_KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
+_STOP: Final = 0.9  # distance from the target at which it stops, m
 
 
 class Idle(BasePolicy):
@@ -63,3 +66,30 @@ def draw_from_observations(words: npt.NDArray[np.uint32], seed: np.uint64, actio
             for k in range(actions.shape[2]):
                 draw = mix(key, np.uint64(k)) >> _SHIFT
                 actions[e, i, k] = np.float32(draw) * _TO_BOTH_SIDES - ONE
+
+
+class Pursuit(BasePolicy):
+    """Velocity pursuit without a formation: the naive team."""
+
+    name = "pursuit"
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions straight at the last fix of the target; in a circle without one."""
+        layout: ObservationLayout = memory
+        s = layout.scenario
+        v = layout.views(check_observations(self, observations, len(observations), layout))
+        fix = v["target_range"][..., None] * v["target_bearing"]
+        x, y = np.moveaxis(fix + np.maximum(v["target_age"], 0.0)[..., None] * v["target_velocity"], -1, 0)
+        known, bearing = v["target_known"] > 0, np.arctan2(y, x)
+        turn = np.where(known, bearing / (2.0 * s.control_step * v["max_turn_rate"]), 0.2)
+        speed = np.where(known, np.where(np.hypot(x, y) > _STOP, np.maximum(np.cos(bearing), 0.0), 0.0), 1.0)
+        # What is ahead within the keep-away width turns it aside, and slows it.
+        angles = 2.0 * np.pi * np.arange(s.sonar_beams) / max(1, s.sonar_beams)
+        if (ahead := np.cos(angles) > 0.3).any():
+            closeness = 1.0 - v["sonar"][..., ahead] / _KEEP_AWAY
+            near, left = closeness > 0.0, np.where(angles[ahead] <= np.pi, 1.0, -1.0)
+            speed = np.minimum(speed, np.where(near, 0.8 * (1.0 - closeness), 1.0).min(axis=-1))
+            turn = turn - np.where(near, left * (0.5 + closeness), 0.0).sum(axis=-1)
+        actions = np.zeros((*turn.shape, 2 + s.message_size), np.float32)
+        actions[..., 0], actions[..., 1] = 2.0 * speed - 1.0, np.clip(turn, -1.0, 1.0)
+        return actions, memory

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 import posse
 from posse_baselines import PolicyError, batch_for, begin, load, play, rollout
-from posse_baselines.policies.belief_planner import BeliefPlanner, BeliefSettings
+from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import Planner, PlannerSettings
 
 QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
 """Looks ahead for a shorter time than it should."""
-QUICK_BELIEF = BeliefSettings(plan=PlannerSettings(look_ahead=0.8, keep=0.4, rounds=0))
+QUICK_BELIEF = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=0)
 NEAR = (1.5, 4.0)
 
 
@@ -152,5 +152,5 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
 
 
 def test_settings_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"fix_trust=0.0 must lie in \[0.01, 1\]"):
-        BeliefSettings(fix_trust=0.0)
+    with pytest.raises(ValueError, match=r"look_ahead=0.0 must lie in \[0.1, 20\]"):
+        PlannerSettings(look_ahead=0.0)

@@ -38,7 +38,7 @@ def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
 def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     names = ("Raises", "Nan", "Exits", "Crashes")
     settings = settings_for(tmp_path, *names)
-    same = "posse_baselines.policies.pursuit:Pursuit"
+    same = "posse_baselines.policies.simple:Pursuit"
     found = compare(replace(settings, policies=(*settings.policies, same)))
     assert [row["policy"] for row in found.rows] == ["idle", "pursuit", same]
     why = {row["policy"].removeprefix(BAD): row["why"] for row in found.failed}
@@ -58,7 +58,7 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
 
 UNGUARDED = """
 from posse_training.cli import main
-policies = ["posse_baselines.policies.pursuit:Pursuit", "--planner-episodes", "0", "--no-figures"]
+policies = ["posse_baselines.policies.simple:Pursuit", "--planner-episodes", "0", "--no-figures"]
 raise SystemExit(main(["compare", *policies, "--scenario", "constant", "--episodes", "2", "--out", "out"]))
 """
 
