@@ -18,7 +18,7 @@ from posse.signals.layout import StateLayout
 
 DRAWS: Final = ("world_seed", "world_split", "world_index", "world_episode", "world_key")
 FOLLOWS: Final = (
-    # from poses: contacts, and who is near to what (test_contact)
+    # from poses: contacts, and who is near to what (test_solid)
     "world_touching",
     "world_near",
     "tracker_touching",
