@@ -1,7 +1,5 @@
 """Imports go from training to baselines to envs only; the tests that the manual names exist."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

@@ -6,8 +6,6 @@ rounding grow with time. After a change that is meant, write the file again::
     PYTHONPATH=envs:baselines python tests/baselines/test_digests.py
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Policies and targets by name, file and code; errors for those that are not there; matches with a target."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tuned policies play the settings of the scenario that they are given; their files are checked."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

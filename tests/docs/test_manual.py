@@ -1,7 +1,5 @@
 """The manual: it documents every public name, finds them, loads nothing from elsewhere, and fits a phone."""
 
-from __future__ import annotations
-
 import fcntl
 import functools
 import html

@@ -1,7 +1,5 @@
 """What pages show: the table of the README, the loop and the notebook, the leaderboard, and the speed benchmark."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import json

@@ -1,7 +1,5 @@
 """Declarations of users' modules: mistakes, declaring again, and the examples of the chapter *Extend posse*."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Worlds of drawn and of chosen scenarios, step by step against a computation of their own in float64."""
 
-from __future__ import annotations
-
 import math
 from operator import attrgetter
 from typing import Any

@@ -4,8 +4,6 @@ They take minutes and the package index, so that they run where POSSE_TEST_PACKA
 continuous integration.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The tutorials of the manual, run unchanged with few steps."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys

@@ -1,7 +1,5 @@
 """Monitoring, the belief that a network reads, and detours."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

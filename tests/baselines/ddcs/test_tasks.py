@@ -1,7 +1,5 @@
 """The four tasks: conditions of changes, behaviour, and effects of leaving a change out."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Guidance, l-φ and l-l: geometry of a pair, heading and rate, the speed of (13), demands on a follower."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any

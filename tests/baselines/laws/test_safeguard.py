@@ -1,7 +1,5 @@
 """The safeguard: robots avoid collisions within their limits."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any

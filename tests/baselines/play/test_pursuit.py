@@ -1,7 +1,5 @@
 """The guidance laws as policies execute them, against closed-form solutions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The planners: scores above other teams, without access to future draws or to what no tracker is told."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

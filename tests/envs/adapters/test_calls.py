@@ -1,7 +1,5 @@
 """Calls in any order: what is refused changes nothing; actions of every form are read, and all kinds play one world."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

@@ -1,7 +1,5 @@
 """The batch: determinism, replays, resets, saving, copies, and returned arrays that never change."""
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 from typing import Any

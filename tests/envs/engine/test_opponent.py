@@ -1,7 +1,5 @@
 """A batch in which a policy moves the target."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

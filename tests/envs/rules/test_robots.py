@@ -1,7 +1,5 @@
 """What real robots have: lag, delay, wheels, drift, noise, outages of sensors, breaks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Nor is a scripted target that trackers held until it had no room to turn; and it gets away again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

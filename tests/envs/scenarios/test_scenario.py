@@ -1,7 +1,5 @@
 """Scenarios: values, overrides, errors; the named ones, what the manual states of them, and slots."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

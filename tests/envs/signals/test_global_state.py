@@ -1,7 +1,5 @@
 """The state vector: worlds with equal vectors and equal draws evolve equally."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import hypothesis

@@ -1,7 +1,5 @@
 """Motion on arcs, and free widths along them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The states of a batch and of one world, as complex numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Comparisons of teams, and all that plays against a given target."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

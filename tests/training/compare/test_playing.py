@@ -1,7 +1,5 @@
 """The failure of a policy is reported, and affects only its own rows."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

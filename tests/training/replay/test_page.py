@@ -1,7 +1,5 @@
 """A page is one small file that makes no requests; its verdict follows from scores and events."""
 
-from __future__ import annotations
-
 import html
 import re
 import shlex

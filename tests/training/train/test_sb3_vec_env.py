@@ -1,7 +1,5 @@
 """The adapter: slots are trackers, last observations are last, truncation is bootstrapped."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
