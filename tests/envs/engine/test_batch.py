@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.support.adapters import out_of_band
+from tests.support.adapters import out_of_band, same
 from tests.support.process import printed
 from tests.support.reference.state import snapshot
 
@@ -28,16 +28,10 @@ def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:
     return out
 
 
-def assert_equal(one: list[npt.NDArray[Any]], other: list[npt.NDArray[Any]]) -> None:
-    assert len(one) == len(other)
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 def test_the_number_of_threads_changes_nothing() -> None:
     whole = play(posse.batch("field", 700, seed=3, num_threads=1), 40)
     for threads in (2, 3, 7):
-        assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
+        assert same(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
 
 
 def test_seed_split_and_episode_each_make_other_worlds() -> None:
@@ -66,11 +60,11 @@ def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
     saved, copies = batch.save(), (pickle.loads(pickle.dumps(batch)), out_of_band(batch))  # noqa: S301
     kept, expected = pickle.loads(pickle.dumps(saved)), onward(batch)  # noqa: S301
     for copy in copies:
-        assert_equal(onward(copy), expected)
+        assert same(onward(copy), expected)
     fresh = posse.batch(name, 3, message_size=1)
     for into, back in ((batch, saved), (batch, kept), (batch, out_of_band(saved)), (fresh, saved)):
         np.testing.assert_array_equal(into.restore(back), now)
-        assert_equal(onward(into), expected)
+        assert same(onward(into), expected)
     for other in (posse.batch(name, 2, message_size=1), posse.batch(name, 3)):
         with pytest.raises(ValueError, match="does not fit"):
             other.restore(saved)
@@ -112,7 +106,7 @@ def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
 
 
 def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
-    assert_equal(in_another_process(tmp_path, "field", 60), here("field", 60))
+    assert same(in_another_process(tmp_path, "field", 60), here("field", 60))
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,7 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
 
 WAY = [0.0] * 10
 FULL = [1.0] * 40
+MOST = "most of the difference arose"
 
 
 def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
@@ -115,32 +116,21 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
 
 
 @pytest.mark.parametrize(
-    ("second", "told"),
+    ("scores", "events", "told"),
     [
-        (
-            player("b", [*WAY, *FULL[:20], *[0.0] * 20], (31, "break")),
-            "40 %; most of the difference arose after 1 break.",
-        ),
-        (
-            player("b", [*WAY, *WAY, *FULL[:30]], (5, "dart")),
-            "60 %; most of the difference arose on the way to the slots.",
-        ),
-        (player("b", [*WAY, *[0.9] * 40]), "72 %."),  # nowhere in particular
-        (player("b", [*WAY, *FULL], (11, "dart")), "80 %."),
-        (
-            player("b", [*WAY, *WAY[:5], *FULL[:5], *WAY, *FULL[:20]], (21, "dart")),
-            "50 %; most of the difference arose in 1 dart.",
-        ),
-        (
-            player("b", [*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], (21, "dart"), (36, "dart")),
-            "40 %; most of the difference arose in 2 darts.",
-        ),
-        (player("b", [*WAY, *FULL], (15, "contact")), "80 % (none counts from its contact at 1.5 s on)."),
+        ([*WAY, *FULL[:20], *[0.0] * 20], [(31, "break")], f"40 %; {MOST} after 1 break."),
+        ([*WAY, *WAY, *FULL[:30]], [(5, "dart")], f"60 %; {MOST} on the way to the slots."),
+        ([*WAY, *[0.9] * 40], [], "72 %."),  # nowhere in particular
+        ([*WAY, *FULL], [(11, "dart")], "80 %."),
+        ([*WAY, *WAY[:5], *FULL[:5], *WAY, *FULL[:20]], [(21, "dart")], f"50 %; {MOST} in 1 dart."),
+        ([*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], [(21, "dart"), (36, "dart")], f"40 %; {MOST} in 2 darts."),
+        ([*WAY, *FULL], [(15, "contact")], "80 % (none counts from its contact at 1.5 s on)."),
     ],
 )
-def test_a_sentence_names_the_shares_held_and_where_the_difference_arose(second: Player, told: str) -> None:
-    first = player("a", [*WAY, *FULL])
-    replay = Replay({"settings": {"control_step": 0.1}}, (first, second))
+def test_a_sentence_names_the_shares_held_and_where_the_difference_arose(
+    scores: list[float], events: list[tuple[int, str]], told: str
+) -> None:
+    replay = Replay({"settings": {"control_step": 0.1}}, (player("a", [*WAY, *FULL]), player("b", scores, *events)))
     assert verdict(replay) == f"a held 80 % of its slots, b {told}"
 
 
