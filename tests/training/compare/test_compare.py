@@ -173,8 +173,10 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_evaluation_names_the_target(file: Path, tmp_path: Path) -> None:
-    many = evaluate("ddcs-distributed", SHORT, 5, target=str(file), progress=False)
+def test_an_evaluation_names_the_target_and_is_the_same_alone(file: Path, tmp_path: Path) -> None:
+    many, few = (evaluate("ddcs-distributed", SHORT, count, target=str(file), progress=False) for count in (5, 2))
+    for name, column in few.columns.items():
+        np.testing.assert_array_equal(column, many[name][:2], name)
     scripted = evaluate("ddcs-distributed", SHORT, 5, progress=False)
     assert not np.array_equal(many["tracking_error"], scripted["tracking_error"])
     assert many.target == "evading"
