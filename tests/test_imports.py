@@ -5,9 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.support.process import printed
-
-ROOT = Path(__file__).parents[1]
+from tests.support.process import ROOT, printed
 
 LEARNING = {"posse_training", "stable_baselines3", "tensordict", "torch", "torchrl"}
 FORBIDDEN = {

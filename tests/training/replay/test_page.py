@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.support.browser import Tags
+from tests.support.process import ROOT
 from tests.support.replays import ATTACK, hostile, short
 
 from posse_training.cli import main
@@ -55,7 +56,7 @@ def test_a_page_describes_itself_for_a_preview_and_links_the_project() -> None:
     told = {one.get("name") or one.get("property"): one.get("content") for tag, one in tags if tag == "meta"}
     assert told["description"] == told["og:description"] == verdict(short())
     assert told["og:title"] == "ddcs-distributed and pursuit on field"
-    pyproject = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert [one["href"] for tag, one in tags if tag == "a"] == [pyproject["project"]["urls"]["Repository"]]
 
 
