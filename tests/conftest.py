@@ -1,7 +1,5 @@
 """Settings of every process that runs tests, made before any library is imported."""
 
-from __future__ import annotations
-
 import os
 
 # Small networks do not gain from torch's threads, which wait for each other by spinning.

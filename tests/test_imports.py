@@ -1,15 +1,11 @@
 """Imports go from training to baselines to envs only; the tests that the manual names exist."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path
 
 import pytest
-from tests.support.process import printed
-
-ROOT = Path(__file__).parents[1]
+from tests.support.process import ROOT, printed
 
 LEARNING = {"posse_training", "stable_baselines3", "tensordict", "torch", "torchrl"}
 FORBIDDEN = {

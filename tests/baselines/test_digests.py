@@ -6,8 +6,6 @@ rounding grow with time. After a change that is meant, write the file again::
     PYTHONPATH=envs:baselines python tests/baselines/test_digests.py
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import begin, load, policy_names
+from posse_baselines import load, policy_names, rollout
 
 FILE = Path(__file__).with_name("digests.json")
 POLICIES = [name for name in policy_names() if name != "belief-planner"]
@@ -37,12 +35,7 @@ def digest(name: str) -> dict[str, list[float]]:
         found[scenario] = []
         for team in TEAMS[:1] if policy.reads_state else TEAMS:
             batch = posse.batch(scenario, WORLDS, message_size=policy.message_size, **team)
-            observations, memory = batch.reset(seed=11), begin(policy, batch)
-            played = np.zeros((STEPS, *batch.action_shape[:2], 2))
-            for step in range(STEPS):
-                actions, memory = policy.act(observations, memory)
-                played[step] = actions[..., :2]
-                observations = batch.step(actions)[0]
+            played = rollout(batch, policy, ["actions"], steps=STEPS, seed=11)["actions"][..., :2]
             weights = np.random.default_rng(0).uniform(-1, 1, played.shape)
             found[scenario] += [round(float(mean), 4) for mean in 10 * (weights * played).mean(axis=(0, 2, 3))]
     return found

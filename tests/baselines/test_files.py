@@ -1,7 +1,5 @@
 """Files are written as a whole or not at all, and nowhere but where they are named."""
 
-from __future__ import annotations
-
 import errno
 import threading
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Properties of every policy: shapes, ranges, equality over batches, restarts, refusals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

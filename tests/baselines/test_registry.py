@@ -1,7 +1,5 @@
 """Policies and targets by name, file and code; errors for those that are not there; matches with a target."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +8,17 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import Policy, PolicyError, batch_for, load, load_target, play, policy_names, target_names
+from posse_baselines import (
+    BasePolicy,
+    Policy,
+    PolicyError,
+    batch_for,
+    load,
+    load_target,
+    play,
+    policy_names,
+    target_names,
+)
 from posse_baselines.playing import rollout
 from posse_baselines.policies.open_loop import OPEN_LOOP
 
@@ -76,17 +84,11 @@ def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 # --- targets -------------------------------------------------------------------------------------
 
 
-class Broken:
+class Broken(BasePolicy):
     """A target of one's own, whose actions have another shape."""
-
-    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
-        return None
 
     def act(self, observations: Any, memory: Any) -> Any:
         return np.zeros((1, 1)), memory
-
-    def restart(self, memory: Any, mask: Any) -> Any:
-        return memory
 
 
 def test_a_scripted_target_is_the_scenarios_motion() -> None:

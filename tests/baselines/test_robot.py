@@ -1,7 +1,5 @@
 """Robots that are given what the trackers of a world measure observe and do the same as those."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

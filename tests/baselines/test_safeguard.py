@@ -1,7 +1,5 @@
 """The safeguard as an action layer: nothing else of the script moves a robot, and robots do not touch."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """``posse/Tracker-v0``: one tracker is a Gymnasium agent, its team-mates are scripted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -4,8 +4,6 @@ A page is followed from top to bottom in an empty folder, its Python and its she
 on Ray only where it is installed, since ``tests/training/cluster`` has them.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib.util
 import re

@@ -1,7 +1,5 @@
 """What pages show: the table of the README, the loop and the notebook, the leaderboard, and the speed benchmark."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import json
@@ -15,13 +13,12 @@ from typing import Any
 
 import matplotlib as mpl
 import pytest
-from tests.support.process import printed
+from tests.support.process import ROOT, printed
 
 import posse
 from posse_baselines import load, play, policy_names
 from posse_training.leaderboard import Standing, standings_text
 
-ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SCENARIOS = (DOCS / "scenarios.md").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """Worlds of drawn and of chosen scenarios, step by step against a computation of their own in float64."""
 
-from __future__ import annotations
-
 import math
 from operator import attrgetter
 from typing import Any
@@ -62,6 +60,16 @@ SETTINGS = st.fixed_dictionaries(
         "break_window": some((0.1, 0.6)),
     },
 )  # fmt: skip
+
+
+def started(name: str, worlds: int, **settings: Any) -> tuple[posse.Batch, npt.NDArray[np.float32]]:
+    """Return a batch and its first observations; of drawn settings, others are drawn where these are refused."""
+    try:
+        batch = posse.batch(name, worlds, **settings)
+        return batch, batch.reset()
+    except posse.ScenarioError:
+        assume(False)
+        raise
 
 
 def chosen(batch: posse.Batch, state: State, rng: np.random.Generator, team: str) -> npt.NDArray[np.float32]:
@@ -159,12 +167,7 @@ def judge(batch: posse.Batch, observations: npt.NDArray[np.float32], seed: int, 
 def test_a_world_goes_as_an_independent_computation_says(
     name: str, changes: dict[str, Any], seed: int, team: str
 ) -> None:
-    try:
-        batch = posse.batch(name, 1, seed=seed, num_threads=1, **changes)
-        observations = batch.reset()
-    except posse.ScenarioError:
-        assume(False)
-        raise
+    batch, observations = started(name, 1, seed=seed, num_threads=1, **changes)
     judge(batch, observations, seed, team)
 
 

@@ -1,7 +1,5 @@
 """The checkers of other libraries find every registered scenario sound, and variants with other settings."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Data sets recorded for Minari reload, recover their environment, and replay what they hold."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Functions and stable-baselines3 models play as policies, by the actions that they choose."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

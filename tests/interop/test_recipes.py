@@ -1,7 +1,5 @@
 """Every recipe of *Use it with* runs as it stands."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

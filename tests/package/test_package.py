@@ -4,10 +4,7 @@ They take minutes and the package index, so that they run where POSSE_TEST_PACKA
 continuous integration.
 """
 
-from __future__ import annotations
-
 import os
-import re
 import subprocess
 import sys
 import tarfile
@@ -15,8 +12,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from tests.support.pages import ROOT, blocks
 
-ROOT = Path(__file__).parents[2]
 PACKAGES = ("envs/posse", "baselines/posse_baselines", "training/posse_training")
 pytestmark = pytest.mark.skipif(
     "POSSE_TEST_PACKAGE" not in os.environ, reason="takes minutes: set POSSE_TEST_PACKAGE=1"
@@ -87,22 +84,14 @@ def test_the_tests_of_the_sdist_run_from_its_own_tree(built: Path, tmp_path: Pat
     run(*pytest_, "tests/test_imports.py", cwd=tree, PYTHONPATH=path)
 
 
-def readme(kind: str) -> list[str]:
-    """Return the code blocks of a kind in the README."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    return re.findall(rf"^```{kind}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-
-
 def test_the_python_of_the_readme_runs(installed: Path, tmp_path: Path) -> None:
-    blocks = readme("python")
-    assert blocks
     script = tmp_path / "readme.py"
-    script.write_text("\n".join(blocks), encoding="utf-8")
+    script.write_text("\n".join(text for kind, _, text in blocks("README.md") if kind == "python"), encoding="utf-8")
     run(installed / "python", script, cwd=tmp_path)
 
 
 def test_the_commands_of_the_readme_are_there(installed: Path, tmp_path: Path) -> None:
-    commands = set(re.findall(r"^\$ (?:\S*/)?posse (\w+)", "\n".join(readme("console")), re.M))
+    commands = {line.split()[1] for _, _, line in blocks("README.md") if line.startswith("posse ")}
     assert commands
     for command in sorted(commands):
         run(installed / "posse", command, "--help", cwd=tmp_path)

@@ -1,7 +1,5 @@
 """Helpers of the adapters' tests."""
 
-from __future__ import annotations
-
 import pickle
 from typing import Any
 

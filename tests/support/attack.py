@@ -1,7 +1,5 @@
 """A common interface to every kind of environment: invalid inputs, and the whole state."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Policies with every kind of failure."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

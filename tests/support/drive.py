@@ -1,7 +1,5 @@
 """Policies driven through the public interface from given poses; a test may steer the target."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

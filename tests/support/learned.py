@@ -1,7 +1,5 @@
 """Networks of arbitrary weights, as policies."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A page of the README or the manual as a script: its Python and the lines of its shell, in order."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """Python in a process of its own, which imports all packages from this tree; users' modules, run there."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """What only a Ray cluster can show; run by ``tests/training/cluster/test_cluster.py`` where Ray is."""
 
-from __future__ import annotations
-
 import filecmp
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Replays for tests, recorded once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Final

@@ -1,7 +1,5 @@
 """Trainings of about a second, and their results."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace

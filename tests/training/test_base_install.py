@@ -1,7 +1,5 @@
 """Without the packages of an extra, commands work or name what to install."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterable
 from pathlib import Path

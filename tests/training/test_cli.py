@@ -1,7 +1,5 @@
 """The command line: fast start, clear errors."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A network as ONNX computes what posse's own forward pass does, in the virtual environment that has onnxruntime."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 from pathlib import Path

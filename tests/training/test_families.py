@@ -1,7 +1,5 @@
 """Families of scenarios: what is drawn, what is refused, and all that plays them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A film shows each policy on the same world."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

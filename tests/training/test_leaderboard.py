@@ -1,7 +1,5 @@
 """Claims for the leaderboard: written into a folder of their own, measured again on fresh worlds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Leagues: generations, cross-play, best responses, and going on after a kill."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The options that commands share: what is written behind them, and what it becomes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Shipping: the best of several training seeds, with the scores of all seeds."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``posse tune``: what it finds, how it resumes, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The tutorials of the manual, run unchanged with few steps."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys
@@ -13,11 +11,11 @@ import numpy as np
 import pytest
 import torch
 from safetensors.numpy import load_file
+from tests.support.process import ROOT
 
 from posse_baselines import load
 from posse_training import evaluate
 
-ROOT = Path(__file__).parents[2]
 TUTORIALS = ROOT / "docs" / "tutorials"
 NUMBER = r"(\d\.\d+)"
 

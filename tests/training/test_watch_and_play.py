@@ -1,7 +1,5 @@
 """``posse demo``, and ``posse watch`` and ``posse play`` at the keys of a window without a screen."""
 
-from __future__ import annotations
-
 import re
 import webbrowser
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Selection and exchange of leaders by section 3.5, agreed on by radio."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

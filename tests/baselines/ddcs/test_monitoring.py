@@ -1,7 +1,5 @@
 """Monitoring, the belief that a network reads, and detours."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -10,7 +8,7 @@ import pytest
 from tests.support.reference.state import Complexes, directions, points
 
 import posse
-from posse_baselines import begin, load
+from posse_baselines import begin, load, rollout
 from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
 from posse_baselines.ddcs.belief import BELIEF, beliefs_of
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
@@ -28,21 +26,16 @@ from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
 def test_the_estimate_is_nearer_to_the_target_than_the_fix(
     scenario: str, settings: dict[str, Any], delayed: bool, share: float
 ) -> None:
-    policy = load("ddcs-distributed")
     batch = posse.batch(scenario, 20, message_size=5, autoreset="disabled", split="train", **settings)
-    observations, memory, estimated, fixed = batch.reset(), begin(policy, batch), [], []
-    for step in range(150):
-        v, target = batch.layout.views(observations), points(batch, "world")[:, None]
-        actions, memory = policy.act(observations, memory)
-        counts = (v["target_age"] > 0.5) & (v["target_age"] < 1.5) if delayed else v["target_known"] > 0
-        if step > 50:
-            x, y = np.moveaxis(policy.annotations(memory)["estimate"][..., :2], -1, 0)
-            position, heading, bearing = (v[name] @ [1, 1j] for name in ("position", "heading", "target_bearing"))
-            estimated.append(np.abs(x + 1j * y - target)[counts])
-            fixed.append(np.abs(position + v["target_range"] * bearing * heading - target)[counts])
-        observations, *_ = batch.step(actions)
-    assert np.concatenate(fixed).size > 100
-    assert np.concatenate(estimated).mean() < share * np.concatenate(fixed).mean()
+    played = rollout(batch, load("ddcs-distributed"), ["observations", "annotations", "target_pose"], steps=150)
+    v, late = batch.layout.views(played["observations"][:-1]), slice(51, None)
+    counts = (v["target_age"] > 0.5) & (v["target_age"] < 1.5) if delayed else v["target_known"] > 0
+    position, heading, bearing = (v[name] @ [1, 1j] for name in ("position", "heading", "target_bearing"))
+    target = played["target_pose"][:-1, :, None, :2] @ [1, 1j]
+    estimated = np.abs(played["annotation/estimate"][..., :2] @ [1, 1j] - target)[late][counts[late]]
+    fixed = np.abs(position + v["target_range"] * bearing * heading - target)[late][counts[late]]
+    assert fixed.size > 100
+    assert estimated.mean() < share * fixed.mean()
 
 
 def test_noise_of_the_headings_is_filtered() -> None:
@@ -50,15 +43,9 @@ def test_noise_of_the_headings_is_filtered() -> None:
     for trust in (1.0, 0.1):
         policy = DDCS.of("ddcs-distributed").with_settings(heading_trust=trust)
         batch = posse.batch("smart", 20, message_size=5, autoreset="disabled", split="train", heading_noise=noise)
-        observations, memory, wrong = batch.reset(), begin(policy, batch), []
-        for step in range(120):
-            heading = directions(batch, "world")
-            actions, memory = policy.act(observations, memory)
-            if step > 60:
-                estimate = policy.annotations(memory)["estimate"][..., 2]
-                wrong.append(np.angle(np.exp(1j * estimate) / heading[:, None]))
-            observations = batch.step(actions)[0]
-        errors[trust] = np.std(wrong)
+        played = rollout(batch, policy, ["annotations", "target_pose"], steps=120)
+        wrong = played["annotation/estimate"][61:, ..., 2] - played["target_pose"][61:-1, :, None, 2]
+        errors[trust] = np.std(np.angle(np.exp(1j * wrong)))
     assert errors[1.0] == pytest.approx(noise, rel=0.1, abs=0.005)
     assert errors[0.1] <= 0.5 * noise
 

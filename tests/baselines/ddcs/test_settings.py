@@ -1,7 +1,5 @@
 """Settings are declared with unit, range and use in tuning; invalid ones are refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

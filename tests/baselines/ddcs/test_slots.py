@@ -1,7 +1,5 @@
 """The whole team at play: it takes its slots, searches, keeps off obstacles, bears late commands and drift."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

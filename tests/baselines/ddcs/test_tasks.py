@@ -1,13 +1,11 @@
 """The four tasks: conditions of changes, behaviour, and effects of leaving a change out."""
 
-from __future__ import annotations
-
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.support.drive import complex_of, drive
+from tests.support.reference.score import slots
 
 import posse
 from posse_baselines import DDCS, play
@@ -38,9 +36,7 @@ def test_searching_lasts_until_the_target_is_seen_or_reported() -> None:
 
 def test_converging_and_flocking_change_with_hysteresis() -> None:
     settings = DDCS.of("ddcs-distributed").settings
-    wing = 1.2 * math.sqrt(0.5)
-    wings = [-1.2 - k * wing + 1j * side * k * wing for k in (1, 2) for side in (1, -1)]
-    wedge = np.array([-1.2, *wings])
+    wedge = slots(posse.get_scenario("accelerating"))
     begun, before = 0, None
     for now in drive("ddcs-distributed", "accelerating", 20, 250, split="train"):
         task, slot = now.notes["task"], wedge[now.notes["slot"]]

@@ -1,7 +1,5 @@
 """Guidance, l-φ and l-l: geometry of a pair, heading and rate, the speed of (13), demands on a follower."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from tests.support.reference.motion import on_arc
 
 from posse_baselines.laws import formation, guidance
 from posse_baselines.laws.formation import Demand
@@ -18,17 +17,6 @@ from posse_baselines.laws.guidance import BODY, line_of_sight, regulate
 
 PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
 ANGLES = st.floats(-math.pi, math.pi)
-
-Pose = tuple[complex, float]
-"""A position in the complex plane (m) and a heading (rad), which is not wrapped."""
-
-
-def move(pose: Pose, speed: float, omega: float, dt: float) -> Pose:
-    """Follow a circular arc: its chord has the direction of the heading at half the turn."""
-    position, theta = pose
-    half = omega * dt / 2
-    chord = speed * dt * (math.sin(half) / half if half else 1.0)
-    return position + cmath.rect(chord, theta + half), theta + omega * dt
 
 
 def short_way(angle: float) -> float:
@@ -61,8 +49,8 @@ def test_bearing_rate_is_the_derivative_of_the_bearing(
     r: float, sigma: float, theta: float, target_theta: float, speed: float, target_speed: float
 ) -> None:
     def gap(dt: float) -> complex:
-        target = move((cmath.rect(r, sigma), target_theta), target_speed, 0.3, dt)
-        return target[0] - move((0j, theta), speed, -1.0, dt)[0]
+        target, _ = on_arc(cmath.rect(r, sigma), cmath.rect(1.0, target_theta), target_speed, 0.3, dt)
+        return target - on_arc(0j, cmath.rect(1.0, theta), speed, -1.0, dt)[0]
 
     rate = guidance.bearing_rate(r, cmath.rect(target_speed, target_theta - sigma), cmath.rect(speed, theta - sigma))
     step = 1e-5
@@ -208,10 +196,8 @@ def test_a_held_command_takes_the_control_point_where_its_velocity_leads(
 ) -> None:
     assume(OFFSET + 0.5 * ahead * dt > 0.02)
     speed, omega = formation.held_command(complex(ahead, across), OFFSET, dt)
-    half = omega * dt / 2
-    chord = speed * dt * (math.sin(half) / half if half else 1.0)
-    point = cmath.rect(chord, half) + cmath.rect(OFFSET, omega * dt)
-    assert point == pytest.approx(OFFSET + dt * complex(ahead, across), abs=1e-9)
+    place, heading = on_arc(0j, 1 + 0j, speed, omega, dt)
+    assert place + OFFSET * heading == pytest.approx(OFFSET + dt * complex(ahead, across), abs=1e-9)
 
 
 def test_the_sampled_rate_leaves_what_an_exponential_leaves() -> None:

@@ -1,7 +1,5 @@
 """Assignment of slots, intercept times, and velocities towards a slot."""
 
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -1,7 +1,5 @@
 """Learned policies with a scripted adviser."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.support.learned import network_for, policy_for

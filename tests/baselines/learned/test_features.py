@@ -1,7 +1,5 @@
 """What networks read and answer: encodings by name, features of the state, and the numbers that come out."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

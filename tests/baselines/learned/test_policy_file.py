@@ -1,7 +1,5 @@
 """Policy files give back the policy; other and damaged ones are refused by name, and reading one runs no code."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import sys

@@ -1,7 +1,5 @@
 """The shipped learned teams and targets: intact, small, and with the scores of their cards."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Followers of the centralized model as policies play them: l-φ and l-l, and their frames."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable

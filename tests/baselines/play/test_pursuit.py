@@ -1,7 +1,5 @@
 """The guidance laws as policies execute them, against closed-form solutions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -9,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from tests.support.drive import Floats, complex_of, drive
+from tests.support.reference.score import slots
 
+from posse import get_scenario
 from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import CONVERGING, FLOCKING
 
@@ -96,10 +96,8 @@ def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: f
     settled = np.abs(relative[200:] - relative[-1]).max(axis=(0, 2)) < 0.1
     assert settled.all()
     # Where they end: the five slots of the wedge, one each.
-    wing = 0.8 * math.sqrt(0.5)
-    wedge = [-0.8, *(-0.8 - k * wing + 1j * s * k * wing for k in (1, 2) for s in (1, -1))]
     places = relative[-1] * np.exp(-1j * theta)
-    distance = np.abs(places[:, :, None] - np.array(wedge))
+    distance = np.abs(places[:, :, None] - slots(get_scenario("paper-distributed")))
     assert distance.min(axis=1).max() < 0.05
     assert (np.sort(distance.argmin(axis=2), axis=1) == np.arange(5)).all()
 

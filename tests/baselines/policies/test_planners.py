@@ -1,7 +1,5 @@
 """The planners: scores above other teams, without access to future draws or to what no tracker is told."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -134,18 +132,11 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     """What a tracker is told is 0.3 s old; of a constant target it knows the present pose, of a smart one nearly so."""
     late = {"sensing_range": 4.0, "radio_range": 9.0, "radio_delay": 3, "start_distance": (2.0, 6.0)}
     batch = for_beliefs("smart", 8, seed=2, target_motion=motion, **late)
-    policy, observations = BeliefPlanner(QUICK_BELIEF), batch.reset()
-    memory, errors, ages = begin(policy, batch), [], []
-    for _ in range(40):
-        actions, memory = policy.act(observations, memory)
-        views, world = batch.layout.views(observations), batch.worlds
-        away = policy.annotations(memory)["estimate"][..., :2] - np.stack([world["x"], world["y"]], axis=-1)[:, None]
-        errors.append(np.linalg.norm(away, axis=-1))
-        ages.append(views["target_age"])
-        observations = batch.step(actions)[0]
-    only_told = np.array(ages) > 0.25
+    played = rollout(batch, BeliefPlanner(QUICK_BELIEF), ["observations", "annotations", "target_pose"], steps=40)
+    away = played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]
+    only_told = batch.layout.views(played["observations"][:-1])["target_age"] > 0.25
     assert only_told.sum() > 50
-    wrong = np.array(errors)[only_told]
+    wrong = np.linalg.norm(away, axis=-1)[only_told]
     assert np.median(wrong) < 0.01
     if motion == "constant":
         assert wrong.max() < 1e-3

@@ -1,7 +1,5 @@
 """The environments of Gymnasium and PettingZoo: what they return, when they end, what they refuse."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """The vector environments agree with Gymnasium's own over single ones, infos included."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Invalid input raises an error that names it and the valid range, and changes nothing."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

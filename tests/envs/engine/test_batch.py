@@ -1,6 +1,4 @@
-"""The batch: determinism, replays, resets, saving, and returned arrays that never change."""
-
-from __future__ import annotations
+"""The batch: determinism, replays, resets, saving, copies, and returned arrays that never change."""
 
 import pickle
 from pathlib import Path
@@ -9,8 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.support.adapters import out_of_band
+from tests.support.adapters import out_of_band, same
 from tests.support.process import printed
+from tests.support.reference.state import snapshot
 
 import posse
 
@@ -29,16 +28,10 @@ def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:
     return out
 
 
-def assert_equal(one: list[npt.NDArray[Any]], other: list[npt.NDArray[Any]]) -> None:
-    assert len(one) == len(other)
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 def test_the_number_of_threads_changes_nothing() -> None:
     whole = play(posse.batch("field", 700, seed=3, num_threads=1), 40)
     for threads in (2, 3, 7):
-        assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
+        assert same(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
 
 
 def test_seed_split_and_episode_each_make_other_worlds() -> None:
@@ -67,11 +60,11 @@ def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
     saved, copies = batch.save(), (pickle.loads(pickle.dumps(batch)), out_of_band(batch))  # noqa: S301
     kept, expected = pickle.loads(pickle.dumps(saved)), onward(batch)  # noqa: S301
     for copy in copies:
-        assert_equal(onward(copy), expected)
+        assert same(onward(copy), expected)
     fresh = posse.batch(name, 3, message_size=1)
     for into, back in ((batch, saved), (batch, kept), (batch, out_of_band(saved)), (fresh, saved)):
         np.testing.assert_array_equal(into.restore(back), now)
-        assert_equal(onward(into), expected)
+        assert same(onward(into), expected)
     for other in (posse.batch(name, 2, message_size=1), posse.batch(name, 3)):
         with pytest.raises(ValueError, match="does not fit"):
             other.restore(saved)
@@ -113,7 +106,7 @@ def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
 
 
 def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
-    assert_equal(in_another_process(tmp_path, "field", 60), here("field", 60))
+    assert same(in_another_process(tmp_path, "field", 60), here("field", 60))
 
 
 @pytest.mark.parametrize(
@@ -133,3 +126,80 @@ def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_p
     plain = in_another_process(tmp_path, name, steps, NUMBA_DISABLE_JIT="1")
     for mine, theirs in zip(here(name, steps), plain, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=1e-3)
+
+
+# --- copies ---------------------------------------------------------------------------------------
+
+
+NOTHING_DRAWN = ("constant", "smart", "obstacles")
+DRAWS = ("accelerating", "radio", "leader-loss", "field")
+
+
+def played(name: str, worlds: int = 3, steps: int = 40, **overrides: Any) -> posse.Batch:
+    near: dict[str, Any] = {"start_distance": (1.5, 4.0)}
+    batch = posse.batch(name, worlds, seed=4, **{**near, **overrides})
+    batch.reset()
+    for step in range(steps):
+        batch.step(actions_for(batch, step))
+    return batch
+
+
+def repeated(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
+    """Return the actions of a batch for two copies of it."""
+    return np.repeat(actions_for(batch, step), 2, axis=0)
+
+
+@pytest.mark.parametrize("name", [*NOTHING_DRAWN, *DRAWS])
+def test_copies_draw_what_neither_their_original_nor_other_copies_draw(name: str) -> None:
+    """And go on as their originals where nothing is drawn."""
+    batch = played(name)
+    copies = batch.copies(2)
+    assert copies.num_worlds == 6
+    np.testing.assert_array_equal(copies.observe(), np.repeat(batch.observe(), 2, axis=0))
+    seen, own = [], []
+    for step in range(100, 500 if name == "leader-loss" else 130):
+        seen.append(copies.step(repeated(batch, step))[0])
+        own.append(batch.step(actions_for(batch, step))[0])
+    first, second, original = np.stack(seen)[:, ::2], np.stack(seen)[:, 1::2], np.stack(own)
+    for one, other in ((first, original), (second, original), (first, second)):
+        assert ((one != other).any(axis=(0, 2, 3)) == (name in DRAWS)).all()
+
+
+def test_what_copies_draw_follows_from_seed_and_step() -> None:
+    def future(seed: int, steps: int = 40, into: posse.Batch | None = None) -> npt.NDArray[np.float32]:
+        batch = played("field", steps=steps)
+        copies = batch.copies(2, seed=seed, into=into)
+        for step in range(20):
+            seen = copies.step(repeated(batch, step))[0]
+        return seen
+
+    used = played("field", 6)
+    np.testing.assert_array_equal(future(1), future(1, into=used))
+    assert not np.array_equal(future(1), future(2))
+
+
+def test_the_episode_after_a_copy_s_end_is_no_world_s() -> None:
+    batch = played("constant", 2, steps=9, horizon=10, settle_time=0.5)
+    copies = batch.copies(2)
+    for step in range(2):
+        batch.step(actions_for(batch, step))
+        copies.step(repeated(batch, step))
+    assert (copies.worlds["step"] == 0).all()
+    assert len({*batch.worlds["x"].tolist(), *copies.worlds["x"].tolist()}) == 6
+
+
+def test_faults_that_have_begun_stay_and_others_are_drawn_anew() -> None:
+    batch = played("field", 200, steps=300)
+    copies = batch.copies(20)
+    own, theirs = snapshot(batch), snapshot(copies)
+    for name in ("tracker_sensor_dead_from", "tracker_radio_dead_from"):
+        begun = np.repeat(own[name] <= 300, 20, axis=0)
+        np.testing.assert_array_equal(theirs[name][begun], np.repeat(own[name], 20, axis=0)[begun])
+        coming = theirs[name][~begun]
+        assert not np.array_equal(coming, np.repeat(own[name], 20, axis=0)[~begun])
+        assert (coming > 300).all()
+        # A fifth has an outage at a uniform step of 600; of those with none by 300, a ninth.
+        assert (coming < 600).mean() == pytest.approx(1 / 9, abs=0.015)
+        assert coming[coming < 600].mean() == pytest.approx(450, abs=10)
+    for name in ("tracker_broken_at", "world_breaks_left"):
+        np.testing.assert_array_equal(theirs[name], np.repeat(own[name], 20, axis=0))

@@ -1,8 +1,7 @@
 """A batch in which a policy moves the target."""
 
-from __future__ import annotations
-
 from copy import deepcopy
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -88,12 +87,8 @@ def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
 def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
     batch = posse.batch(SHORT, 1, seed=5, target_policy=Weaver())
     expected = batch.reset()
-    if vector:
-        env: Any = gym.make_vec(
-            "posse/Team-v0", 1, vectorization_mode="vector_entry_point", scenario=SHORT, target_policy=Weaver()
-        )
-    else:
-        env = gym.make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
+    make: Any = partial(gym.make_vec, vectorization_mode="vector_entry_point") if vector else gym.make
+    env = make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
     assert env.action_space.shape[-2:] == (2, 2)
     observation, _ = env.reset(seed=5)
     for step in range(HORIZON):

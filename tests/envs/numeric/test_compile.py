@@ -1,7 +1,5 @@
 """Compiled functions: what they calculate, and that a kernel kept on disk is never stale or damaged."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Threads: every world is done once, results do not depend on them, and an error leaves no work behind."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

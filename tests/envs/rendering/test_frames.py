@@ -1,7 +1,5 @@
 """Frames: what is drawn where, and that equal states give equal frames."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The window of the mode "human": pause, one step, speed, close; in anybody's loop."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 

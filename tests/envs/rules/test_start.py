@@ -1,7 +1,5 @@
 """Starts of episodes: random draws, and no overlaps."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

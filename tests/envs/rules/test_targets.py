@@ -1,7 +1,5 @@
 """Target motions: constant, accelerating, smart (as documented in its module), and what lies in their way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,15 +1,13 @@
 """The state vector: worlds with equal vectors and equal draws evolve equally."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import hypothesis
 import numpy as np
 import numpy.typing as npt
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
-from tests.envs.test_random_worlds import SETTINGS
+from tests.envs.test_random_worlds import SETTINGS, started
 from tests.support.reference.state import directions, points
 
 import posse
@@ -18,7 +16,7 @@ from posse.signals.layout import StateLayout
 
 DRAWS: Final = ("world_seed", "world_split", "world_index", "world_episode", "world_key")
 FOLLOWS: Final = (
-    # from poses: contacts, and who is near to what (test_contact)
+    # from poses: contacts, and who is near to what (test_solid)
     "world_touching",
     "world_near",
     "tracker_touching",
@@ -84,14 +82,8 @@ def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float3
     name=st.sampled_from(posse.scenario_names()), changes=SETTINGS, steps=st.integers(0, 60), seed=st.integers(0, 2**20)
 )
 def test_equal_states_with_equal_draws_go_on_alike(name: str, changes: dict[str, Any], steps: int, seed: int) -> None:
-    try:
-        scenario = posse.get_scenario(name, **changes)
-        posse.batch(scenario, 8, seed=seed).reset()
-    except posse.ScenarioError:
-        assume(False)
-        raise
-    one, other = (posse.batch(scenario, 8, seed=seed) for _ in range(2))
-    one.reset()
+    one, _ = started(name, 8, seed=seed, **changes)
+    other = posse.batch(scenario := one.scenario, 8, seed=seed)
     rng = np.random.default_rng(seed)
     for _ in range(steps):
         one.step(drive(one, rng))

@@ -1,7 +1,5 @@
 """The observation: what the target is given, layout, and eight observers at once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motion on arcs, and free widths along them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,7 @@ import posse
 def on_arc(place: complex, heading: complex, speed: float, turn_rate: float, time: float) -> tuple[complex, complex]:
     """Return position and heading after a time on the circle of (V, ω)."""
     turned = heading * np.exp(1j * turn_rate * time)
-    if turn_rate == 0.0:
+    if abs(turn_rate * time) < 1e-12:
         return place + speed * time * heading, turned
     # For a small turn the circle's centre is so far away that the difference of two points
     # relative to it is dominated by rounding.

@@ -1,7 +1,5 @@
 """The observation of one tracker."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Slots, score and metrics of an episode."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 

@@ -1,7 +1,5 @@
 """The states of a batch and of one world, as complex numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ Complexes = npt.NDArray[np.complex128]
 
 NEVER = 2**30
 NAMES = tuple(name for name in posse.scenario_names() if name != "robots")
-"""The scenarios computed here: robots obey at once and know where they are. Others are in test_robots.py."""
+"""The scenarios computed here: robots obey at once and know where they are. The other is in test_robots.py."""
 TOUCHING = 0.001  # m, of free width
 
 

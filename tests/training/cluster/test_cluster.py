@@ -1,7 +1,5 @@
 """What results on a cluster depend on, what is refused, and two nodes of Ray."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The failure of a policy is reported, and affects only its own rows."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -10,13 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.support.process import printed
+from tests.support.process import ROOT, printed
 
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
 
-ROOT = Path(__file__).parents[3]
 BAD = "tests.support.bad_policies:"
 OPTIONS = ["--scenario", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
 

@@ -1,7 +1,5 @@
 """Figures of a comparison show its data; one page holds all estimates and figures, with replays beside it."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,9 +1,8 @@
-"""A page is one small file that makes no requests."""
-
-from __future__ import annotations
+"""A page is one small file that makes no requests; its verdict follows from scores and events."""
 
 import html
 import re
+import shlex
 import tomllib
 from collections.abc import Callable
 from functools import partial
@@ -12,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.support.browser import Tags
+from tests.support.process import ROOT
 from tests.support.replays import ATTACK, hostile, short
 
 from posse_training.cli import main
 from posse_training.errors import SettingsError
-from posse_training.replay import Replay, read_replay, record, write_replay
+from posse_training.replay import Event, Player, Replay, read_replay, record, write_replay
 from posse_training.replay.format import resolution_of
-from posse_training.replay.page import page, verdict
+from posse_training.replay.page import command, page, verdict
 
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])
@@ -56,7 +56,7 @@ def test_a_page_describes_itself_for_a_preview_and_links_the_project() -> None:
     told = {one.get("name") or one.get("property"): one.get("content") for tag, one in tags if tag == "meta"}
     assert told["description"] == told["og:description"] == verdict(short())
     assert told["og:title"] == "ddcs-distributed and pursuit on field"
-    pyproject = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert [one["href"] for tag, one in tags if tag == "a"] == [pyproject["project"]["urls"]["Repository"]]
 
 
@@ -102,3 +102,49 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
     assert replay.world["changed"] == {"num_trackers": [5, 3]}
     assert main(["replay", "replay.html", "random", *world]) == 2
     assert "did not play the same world: num_trackers" in capsys.readouterr().err
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+WAY = [0.0] * 10
+FULL = [1.0] * 40
+MOST = "most of the difference arose"
+
+
+def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
+    return Player(name, {"score": np.array([0.0, *scores])}, tuple(Event(step, kind, "") for step, kind in events))
+
+
+@pytest.mark.parametrize(
+    ("scores", "events", "told"),
+    [
+        ([*WAY, *FULL[:20], *[0.0] * 20], [(31, "break")], f"40 %; {MOST} after 1 break."),
+        ([*WAY, *WAY, *FULL[:30]], [(5, "dart")], f"60 %; {MOST} on the way to the slots."),
+        ([*WAY, *[0.9] * 40], [], "72 %."),  # nowhere in particular
+        ([*WAY, *FULL], [(11, "dart")], "80 %."),
+        ([*WAY, *WAY[:5], *FULL[:5], *WAY, *FULL[:20]], [(21, "dart")], f"50 %; {MOST} in 1 dart."),
+        ([*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], [(21, "dart"), (36, "dart")], f"40 %; {MOST} in 2 darts."),
+        ([*WAY, *FULL], [(15, "contact")], "80 % (none counts from its contact at 1.5 s on)."),
+    ],
+)
+def test_a_sentence_names_the_shares_held_and_where_the_difference_arose(
+    scores: list[float], events: list[tuple[int, str]], told: str
+) -> None:
+    replay = Replay({"settings": {"control_step": 0.1}}, (player("a", [*WAY, *FULL]), player("b", scores, *events)))
+    assert verdict(replay) == f"a held 80 % of its slots, b {told}"
+
+
+def test_the_command_makes_the_same_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    replay = record(["idle", "pursuit"], "duel", num_trackers=3, target="eight", seconds=2, observations=False)
+    path = write_replay(replay, "replay.html")
+    again = shlex.split(command(read_replay(path)))
+    assert main([*again[1:], "--out", "again.html"]) == 0
+    assert Path("again.html").read_text() == path.read_text()
+
+
+def test_what_no_command_makes_has_none() -> None:
+    assert command(hostile()) == ""
+    assert command(record(["idle"], "smart", target_speed=0.5, seconds=1)).endswith(" --set target_speed=0.5")
+    assert command(short()).startswith("posse replay ddcs-distributed pursuit --scenario field ")

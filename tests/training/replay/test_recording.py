@@ -1,7 +1,5 @@
 """Recordings agree with the played steps and the engine's counts, also after writing and reading."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The batch in TorchRL: same numbers, TorchRL's names, partial resets."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

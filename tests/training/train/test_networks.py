@@ -1,7 +1,5 @@
 """The layers of a model, a copy of an expert, and what is exported."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A resumed run is bit-identical to an uninterrupted one; errors of a run folder are named, and no data are lost."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The adapter: slots are trackers, last observations are last, truncation is bootstrapped."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -180,20 +178,18 @@ class _Recorder(BaseCallback):
     def __init__(self) -> None:
         super().__init__()
         self.rewards: list[Any] = []
-        self.dones: list[Any] = []
         self.finals: list[dict[int, Any]] = []
 
     def _on_step(self) -> bool:
         infos = self.locals["infos"]
         self.rewards.append(self.locals["rewards"].copy())
-        self.dones.append(self.locals["dones"].copy())
         self.finals.append({s: i["terminal_observation"] for s, i in enumerate(infos) if i.get("TimeLimit.truncated")})
         return True
 
 
 def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
-    """Against an independent computation of generalized advantages."""
-    discount, decay, steps = 0.9, 0.8, 3 * HORIZON
+    """Without a trace, an advantage is the difference of one step."""
+    discount, steps = 0.9, 3 * HORIZON
     env = make(staggered=True)
     model = PPO(
         "MlpPolicy",
@@ -201,7 +197,7 @@ def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
         n_steps=steps,
         batch_size=steps * env.num_envs,
         gamma=discount,
-        gae_lambda=decay,
+        gae_lambda=0.0,
         seed=0,
         device="cpu",
         policy_kwargs={"features_extractor_class": Normaliser},
@@ -216,21 +212,11 @@ def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
 
     buffer = model.rollout_buffer
     values = np.stack([value(rows) for rows in buffer.observations])
-    after = value(model._last_obs)
-    advantages = np.zeros_like(values)
-    truncated = 0
-    for slot in range(env.num_envs):
-        ahead = 0.0
-        for t in reversed(range(steps)):
-            following = after[slot] if t == steps - 1 else values[t + 1, slot]
-            if recorder.dones[t][slot]:
-                # The value of where it truly was, not of the next episode's start.
-                following = value(recorder.finals[t][slot][None])[0]
-                ahead = 0.0
-                truncated += 1
-            delta = recorder.rewards[t][slot] + discount * following - values[t, slot]
-            ahead = delta + discount * decay * ahead
-            advantages[t, slot] = ahead
-    assert truncated >= 2 * env.num_envs
+    following = np.concatenate([values[1:], value(model._last_obs)[None]])
+    for step, ends in enumerate(recorder.finals):
+        for slot, final in ends.items():  # the value of where it truly was, not of the next episode's start
+            following[step, slot] = value(final[None])[0]
+    assert sum(map(len, recorder.finals)) >= 2 * env.num_envs
+    advantages = np.array(recorder.rewards) + discount * following - values
     np.testing.assert_allclose(buffer.advantages, advantages, rtol=1e-4, atol=2e-4)
     np.testing.assert_allclose(buffer.returns, advantages + values, rtol=1e-4, atol=2e-4)

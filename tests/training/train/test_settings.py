@@ -1,7 +1,5 @@
 """Training settings: checked before a run folder is made, and read from files without code."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

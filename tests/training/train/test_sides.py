@@ -1,7 +1,5 @@
 """Training of targets against teams, and of teams against targets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

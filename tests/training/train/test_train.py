@@ -1,7 +1,5 @@
 """Training: the same from the same seed, and the best policy is kept."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path
