@@ -45,6 +45,7 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "replay": replays.replay,
     "leaderboard": standings.leaderboard,
     "results": standings.results,
+    "headroom": standings.headroom,
     "training_seeds": standings.training_seeds,
     "algorithms": standings.algorithms,
     "bibtex": bibtex,

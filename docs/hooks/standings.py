@@ -75,6 +75,18 @@ def results() -> str:
     return table(("team", *SCENARIOS), rows)
 
 
+def headroom() -> str:
+    """Return what separates the tuned script from the planner: control, then information."""
+    rows = []
+    for name in SCENARIOS:
+        scores = {row.label: row.safe_score for row in of_scenario(name)}
+        script, belief, planner = (scores.get(label) for label in ("ddcs-tuned", "belief-planner", "planner"))
+        if script and belief and planner:
+            gains = belief - script, planner - belief
+            rows.append((code(name), f"{script:.3f}", *(f"{gain:+.3f}" for gain in gains), f"{planner:.3f}"))
+    return table(("scenario", "`ddcs-tuned`", "control", "information", "planner"), rows)
+
+
 def training_seeds() -> str:
     """Return the safe score of every training seed of the shipped teams, from their cards."""
     rows = []

@@ -11,6 +11,7 @@ The functions take records: ``c`` the scenario (:data:`posse.rules.state.CONFIG`
 from __future__ import annotations
 
 import difflib
+import functools
 import inspect
 import keyword
 import math
@@ -51,6 +52,7 @@ def plain(function: Any) -> Any:
     return getattr(function, "py_func", function)
 
 
+@functools.cache  # metrics ask at the end of every episode
 def parameters_of(function: Function) -> tuple[str, ...]:
     """Return the names of a function's parameters."""
     return tuple(inspect.signature(plain(function)).parameters)

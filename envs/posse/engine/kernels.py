@@ -47,8 +47,6 @@ from posse.signals.generate import Declarations, generated_for
 from posse.signals.user_functions import check_functions
 from posse.signals.views import Generated, observe_together
 
-Orders = npt.NDArray[np.uint8]
-
 
 class Fixed(NamedTuple):
     """What a batch passes to its kernel every time."""
@@ -64,6 +62,15 @@ class Fixed(NamedTuple):
     worlds: WorldArrays
     scratch: Records
     """(threads,) :data:`posse.rules.state.SCRATCH`."""
+
+
+class Orders(NamedTuple):
+    """What every world is to do."""
+
+    what: npt.NDArray[np.uint8]
+    """(E,) see :func:`advance_worlds`."""
+    actions: FloatArray
+    """(E, rows, 2 + m); control steps alone read them."""
 
 
 class Results(NamedTuple):
@@ -134,16 +141,9 @@ FETCHED: Final = 16
 
 @compiled
 def advance_worlds(
-    first: int,
-    count: int,
-    fixed: Fixed,
-    actions: FloatArray,
-    orders: Orders,
-    results: Results,
-    made: Generated,
-    scratch: Record,
+    first: int, count: int, fixed: Fixed, orders: Orders, results: Results, made: Generated, scratch: Record
 ) -> int:
-    """Execute the orders (E,) of ``count`` worlds from ``first`` on; return how many are over.
+    """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
     STEP               a control step, or the start of the next episode if this one is over
@@ -152,7 +152,7 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH. Control steps alone read the actions (E, rows, 2 + m).
+    ``count`` is at most WIDTH.
     """
     worlds, c, over = fixed.worlds, fixed.config[0], 0
     for e in range(first, first + count):
@@ -162,17 +162,17 @@ def advance_worlds(
             # Written below, after the loop; without prefetching 16,384 worlds take a third longer.
             for offset in range(0, observations.size * observations.itemsize, LINE):
                 fetch(observations, offset)
-        order = orders[e]
+        order = orders.what[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
         if order == STEP:
             apply_faults(c, w, trackers)
-            motion(c, worlds, e, actions[e], made.set_goal, scratch)
+            motion(c, worlds, e, orders.actions[e], made.set_goal, scratch)
             w.step += 1
             if c.drifts != 0:
                 drift(c, w, worlds.odometry[e])
-            keep_messages(c, w, trackers, actions[e], worlds.message[e])
+            keep_messages(c, w, trackers, orders.actions[e], worlds.message[e])
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles, made.draw_motion)
@@ -228,12 +228,10 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     made = generated_for(declarations)
 
     @kernel
-    def advance(
-        fixed: Fixed, actions: FloatArray, orders: Orders, results: Results, thread: int, first: int, end: int
-    ) -> int:
+    def advance(fixed: Fixed, orders: Orders, results: Results, thread: int, first: int, end: int) -> int:
         scratch, over = fixed.scratch[thread], 0
         for e in range(first, end, WIDTH):
-            over += advance_worlds(e, min(WIDTH, end - e), fixed, actions, orders, results, made, scratch)
+            over += advance_worlds(e, min(WIDTH, end - e), fixed, orders, results, made, scratch)
         return over
 
     return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn
