@@ -26,6 +26,8 @@ KINDS: Final = ("plain", "slots", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
 observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
 (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's ``size``."""
+MOST_NEIGHBOURS: Final = 4096
+"""Team-mates that an encoding reads, at most."""
 
 
 class EncodedField(NamedTuple):
@@ -55,6 +57,11 @@ class Encoding:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise PolicyError(f"unknown encoding {self.kind!r:.80}; encodings are: {', '.join(KINDS)}")
+        if not 0 <= self.neighbours <= MOST_NEIGHBOURS:
+            raise PolicyError(f"neighbours={self.neighbours} must lie in [0, {MOST_NEIGHBOURS}]")
+        for field in self.fields:
+            if field.size < 1 or not math.isfinite(field.unknown):
+                raise PolicyError(f"the field {field!r:.200} must have a size above 0 and a finite value for unknown")
 
     @classmethod
     def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
@@ -94,7 +101,11 @@ class Encoding:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
         """Return the encoding of the values that ``dataclasses.asdict`` gives."""
-        return cls(values["kind"], values["neighbours"], tuple(EncodedField(*field) for field in values["fields"]))
+        fields = tuple(
+            EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
+            for name, size, unit, unknown, of_neighbour in values["fields"]
+        )
+        return cls(str(values["kind"]), int(values["neighbours"]), fields)
 
     def _in_order(self) -> list[tuple[EncodedField, int]]:
         """Return the fields in the order in which they are read, those of a team-mate with its place."""

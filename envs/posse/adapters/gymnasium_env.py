@@ -25,10 +25,17 @@ def team_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
 
 
 def solo_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
-    """Return the scenario with one tracker; ScenarioError if it is to have more."""
+    """Return the scenario with one tracker; ScenarioError if it is to have more, or one that breaks."""
     if overrides.setdefault("num_trackers", 1) != 1:
         raise ScenarioError(
             f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has one: use posse/Team-v0"
+        )
+    whole = get_scenario(scenario)
+    if whole.breaks > 0 and "breaks" not in overrides:
+        raise ScenarioError(
+            f"scenario {whole.name!r} does not fit posse/Solo-v0: in it breaks={whole.breaks} "
+            "of the trackers break down, and a team of one would be left with none. Pass "
+            "breaks=0, or use posse/Team-v0"
         )
     return team_scenario(scenario, **overrides)
 

@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import as_motions
 from posse.adapters.base import BatchEnv, joined
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
-from posse.engine.arguments import in_box, mask_of, options_of
+from posse.engine.arguments import check_count, in_box, mask_of, options_of
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario
 from posse.scenarios.family import scenario_or_family, shares
@@ -65,10 +65,10 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         num_threads: int | None = None,
         **settings: Any,
     ) -> None:
+        self.num_envs = check_count("num_envs", num_envs, 1)
         seed, split = settings.get("seed") or 0, settings.get("split", "train")
-        parts = shares(scenario_or_family(scenario), num_envs, min(DRAWN, num_envs), seed, split)
+        parts = shares(scenario_or_family(scenario), self.num_envs, min(DRAWN, self.num_envs), seed, split)
         super().__init__(parts, autoreset=autoreset, num_threads=num_threads, **settings)
-        self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space, self.single_action_space = self._spaces()

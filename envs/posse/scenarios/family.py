@@ -87,15 +87,17 @@ class Family:
         """Return a scenario of the family; it depends on nothing but index, seed and split.
 
         Raises:
-            ScenarioError: An index below 0.
+            ScenarioError: An index or a seed that is no whole number from 0 on.
         """
-        if index < 0:
-            fail("index", index, "it must be at least 0")
-        shares = np.random.default_rng([seed, *split.encode(), index]).random(len(self.ranges))
+        whole: dict[str, Any] = {"index": index, "seed": seed}
+        for name, value in whole.items():
+            if not isinstance(value, int | np.integer) or value < 0:
+                fail(name, value, "it must be a whole number, at least 0")
+        shares = np.random.default_rng([seed, *f"{split}".encode(), index]).random(len(self.ranges))
         values: dict[str, float] = {}
         for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):
-            whole = isinstance(low, int) and isinstance(high, int)
-            values[name] = low + int(share * (high - low + 1)) if whole else low + share * (high - low)
+            steps = isinstance(low, int) and isinstance(high, int)
+            values[name] = low + int(share * (high - low + 1)) if steps else low + share * (high - low)
         return self.base.replace(**values)
 
     def replace(self, **changes: Any) -> Family:
