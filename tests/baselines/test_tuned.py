@@ -1,6 +1,7 @@
 """Tuned policies play the settings of the scenario that they are given; their files are checked."""
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -96,6 +97,7 @@ def write(path: Path, **changes: Any) -> Path:
         ({"settings": {"gian": 1.0}}, r"unknown tunable setting of pngl 'gian' \(did you mean 'gain'"),
         ({"settings": {"gain": "high"}}, "could not convert"),
         ({"settings": {"gain": 7.0}}, r"gain=7.0 must lie in \[0.2, 6\] 1/s"),
+        ({"settings": {"gain": math.nan}}, "gain=nan"),
         ({"settings": {"near": 1.4}}, "near=1.4 must be below far=1.2"),
     ],
 )
