@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -132,6 +132,16 @@ class Space:
         return {t.name: values[t.name] for t in self.tunables if t.name in self.names or values[t.name] != t.default}
 
 
+def advance(
+    cma: CMA, scores: list[list[float]], generation: int, score: Callable[[list[Point]], list[float]]
+) -> None:
+    """Advance a search by a generation: one on record is drawn again and takes its scores, a new one is scored."""
+    points = [cma.ask() for _ in range(cma.population_size)]
+    if generation == len(scores):
+        scores.append(score(points))
+    cma.tell([(p, -v) for p, v in zip(points, scores[generation], strict=True)])
+
+
 def _is_log(t: Tunable) -> bool:
     return t.low > 0.0 and t.high / t.low >= _LOG_FROM
 
@@ -220,11 +230,12 @@ class _Run:
     def _generation(self, cma: CMA, space: Space, generation: int) -> None:
         """Score a generation on worlds of its own, the same for all its candidates; scores on record are taken."""
         s, first = self.settings, generation * self.settings.worlds
-        points = [cma.ask() for _ in range(s.population)]
-        if generation == len(self.scores):
+
+        def score(points: list[Point]) -> list[float]:
             played = self._play(map(space.values, points), s.seed, "train", range(first, first + s.worlds))
-            self.scores.append([float(metrics["safe_score"].mean()) for metrics in played])
-        cma.tell([(p, -v) for p, v in zip(points, self.scores[generation], strict=True)])
+            return [float(metrics["safe_score"].mean()) for metrics in played]
+
+        advance(cma, self.scores, generation, score)
 
     def _validated(self, values: dict[str, float]) -> dict[str, Any]:
         """Return a point of the curve: settings, and their score on the validation worlds."""

@@ -150,6 +150,8 @@ ALGORITHMS: Final = {
     "td3": Algorithm(_td3, _td3_actor, "tanh"),
 }
 """By name; a new algorithm is an entry here, and the function that makes it."""
+EVOLUTION: Final = "cmaes"
+"""The algorithm that has no model of stable-baselines3 (:mod:`posse_training.train.evolution`)."""
 
 
 def algorithm_of(name: str) -> Algorithm:
@@ -159,7 +161,7 @@ def algorithm_of(name: str) -> Algorithm:
         SettingsError: It is unknown.
     """
     if name not in ALGORITHMS:
-        raise SettingsError(f"unknown algorithm {name!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
+        raise SettingsError(f"unknown algorithm {name!r:.80}; algorithms are: {', '.join([*ALGORITHMS, EVOLUTION])}")
     return ALGORITHMS[name]
 
 
@@ -169,7 +171,14 @@ def check_algorithm(settings: TrainSettings) -> None:
     Raises:
         SettingsError: The message names the setting.
     """
-    name, kind = settings.algorithm, algorithm_of(settings.algorithm)
+    name = settings.algorithm
+    if name == EVOLUTION:
+        if settings.advise is None:
+            raise SettingsError(f"algorithm={name!r} learns a correction of a script: use --preset residual")
+        if settings.start is not None:
+            raise SettingsError(f"start={settings.start!r} needs another algorithm than {name}: leave it out")
+        return
+    kind = algorithm_of(name)
     if settings.imitate is not None and not kind.on_policy:
         raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
     if settings.side == "target" and kind.reads_state:

@@ -7,7 +7,7 @@ from importlib import resources
 from typing import Any, Literal
 
 from posse_training.errors import SettingsError
-from posse_training.train.algorithms import algorithm_of
+from posse_training.train.algorithms import EVOLUTION, algorithm_of
 from posse_training.train.settings import TrainSettings
 
 Preset = Literal["nothing", "residual"]
@@ -23,22 +23,24 @@ def default_settings(
         algorithm: One of the algorithms.
         side: What learns; a target learns from nothing, whatever the preset.
         preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn a correction of
-            a scripted team, on policy.
+            a scripted team, on policy or by cmaes.
 
     Raises:
         SettingsError: An unknown algorithm, or a correction off policy.
     """
-    on_policy = algorithm_of(algorithm).on_policy
+    tables: tuple[str, ...] = "all", algorithm
+    if algorithm != EVOLUTION:
+        tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm, scenario
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
     learns: str = preset
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
         learns = "target"
-    elif preset == "residual" and not on_policy:
-        raise SettingsError(f"preset='residual' goes with ppo or mappo, not {algorithm}: use the preset nothing")
+    elif preset == "residual" and "off-policy" in tables:
+        raise SettingsError(f"preset='residual' goes with ppo, mappo or cmaes, not {algorithm}: use the preset nothing")
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
     for name in ("every", learns):
-        for table in ("all", "on-policy" if on_policy else "off-policy", algorithm, scenario):
+        for table in tables:
             values.update(defaults[name].get(table, {}))
     return TrainSettings.from_dict(values)

@@ -46,7 +46,8 @@ class TrainSettings:
     scenario: Names = "smart"
     """Scenario to train on, or several (in Python one text with commas)."""
     algorithm: str = "ppo"
-    """ppo, mappo (ppo with a value function that reads the state of the world), sac or td3."""
+    """ppo, mappo (ppo with a value function that reads the state of the world), sac, td3, or cmaes (evolution of a
+    linear correction of a script)."""
     steps: int = number(20_000_000, "", 1, 10**12)
     """Steps to train for, at least; rollouts are completed."""
     seed: int = number(1, "", 0, 2**32 - 1)
@@ -131,6 +132,12 @@ class TrainSettings:
     """Steps of random actions before learning starts."""
     gradients: int = number(4, "", 1, 10**4)
     """Gradient steps for each control step of the batch."""
+
+    # cmaes; num_worlds is the number that each candidate plays, for whole episodes
+    population: int = number(16, "", 4, 1000)
+    """Candidates in a generation."""
+    deviation: float = number(0.03, "", 1e-6, 10)
+    """Standard deviation of the weights at the start."""
 
     # A warm start
     imitate: str | None = None

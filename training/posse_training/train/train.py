@@ -18,9 +18,10 @@ from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
-from posse_training.train.algorithms import ALGORITHMS, check_algorithm
+from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
 from posse_training.train.display import Display, make_logger
+from posse_training.train.evolution import evolve
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
@@ -60,6 +61,9 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         torch.set_num_threads(settings.threads)
         display = Display(settings, console or Console())
         stack.enter_context(display.bar)
+        if settings.algorithm == EVOLUTION:
+            display.beside = score_beside(settings, display)
+            return evolve(settings, folder, display, num_threads)
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
