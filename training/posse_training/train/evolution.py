@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.scenarios.family import blocks
-from posse_baselines.ddcs.belief import BELIEF, BELIEF_SIZE
+from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
@@ -40,8 +39,6 @@ STATE: Final = "state.json"
 _LIMIT: Final = 10.0  # of an input; all are bounded by less
 _TURNS: Final = ("turn_rate", "law_turn", "frame_rate")
 """Inputs whose sign a mirror changes, beside the second number of every vector."""
-_PERMUTED: Final = ("looks",)
-"""Inputs that a mirror exchanges; they are not read."""
 
 
 def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads: int | None = None) -> Path:
@@ -53,7 +50,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     from cmaes import CMA
 
     s, encoding = settings, Encoding(settings.encoding, 0, ())
-    places = np.array(list(_places(encoding)))
+    basis = _basis(encoding)
     scores: list[list[float]] = []
     curve: list[Point] = []
     seconds = 0.0
@@ -65,10 +62,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     def policy(point: npt.NDArray[np.float64], card: dict[str, Any]) -> LearnedPolicy:
         """Return the correction of these weights."""
-        size = encoding.size + MOTION + BELIEF_SIZE * encoding.believes
-        weights = np.zeros((MOTION, size), np.float32)
-        weights[places[:, 0], places[:, 1]] = point
-        zeros, ones = np.zeros(size, np.float32), np.ones(size, np.float32)
+        weights = np.tensordot(point.astype(np.float32), basis, 1)
+        zeros, ones = np.zeros(weights.shape[1], np.float32), np.ones(weights.shape[1], np.float32)
         network = Network(zeros, ones, _LIMIT, (weights,), (zeros[:MOTION],), s.activation, "clip")
         return LearnedPolicy(network, encoding, card, adviser_of(s))
 
@@ -78,8 +73,11 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         shard = range(first, first + s.num_worlds)
         found = []
         for team in (policy(point, {}) for point in points):
-            matches = [Match(team, pair.opponent, pair.scenario, s.seed, "train") for pair in pairings(s)]
-            played = [play_shard(match, shard, num_threads=num_threads)["safe_score"] for match in matches]
+            played = []
+            for pair in pairings(s):
+                target: Any = pair.opponent
+                match = Match(team, target, pair.scenario, s.seed, "train")
+                played.append(play_shard(match, shard, num_threads=num_threads)["safe_score"])
             found.append(float(np.mean(played)))
         return found
 
@@ -94,7 +92,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
             policy(cma.mean, make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
-    cma = CMA(mean=np.zeros(len(places)), sigma=s.deviation, seed=s.seed, population_size=s.population)
+    cma = CMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
     each = s.population * _steps_of(s)  # of a generation
     generations = -(-s.steps // each)
     display.begin(len(scores) * each, generations * each)
@@ -114,27 +112,39 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     return folder / BEST
 
 
-def _places(encoding: Encoding) -> Iterator[tuple[int, int]]:
-    """Yield the output and the input of each weight: features, what the script wants, and what it believes."""
+def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:
+    """Return the weights (number, MOTION, inputs) that a correction adds up, each as its number in a point says."""
+    images = list(_images(encoding))
+    basis = []
+    for column, (image, sign) in enumerate(images):
+        for output in range(MOTION):
+            weights = np.zeros((MOTION, len(images)), np.float32)
+            weights[output, column] = 1.0
+            weights[output, image] += -sign if output else sign
+            if image >= column and weights.any():
+                basis.append(weights / weights.max())
+    return np.array(basis)
+
+
+def _images(encoding: Encoding) -> Iterator[tuple[int, int]]:
+    """Yield the input that each becomes in a mirror, and its sign there: features, the script's wish, its belief."""
     if encoding.with_features:
         yield from _mirrored(FEATURES, 0)
-    yield from ((k, encoding.size + k) for k in range(MOTION))
+    yield from ((encoding.size, 1), (encoding.size + 1, -1))
     if encoding.believes:
         yield from _mirrored(BELIEF, encoding.size + MOTION)
 
 
 def _mirrored(record: np.dtype[Any], start: int) -> Iterator[tuple[int, int]]:
-    """Yield the output and the input of each weight on a record of floats and vectors."""
+    """Yield the same of the numbers of a record, which begins at an input; ``looks`` go round the tracker."""
+    at = start
     for name in record.names or ():
         field = record[name]
-        at = start + record.fields[name][1] // 4  # type: ignore[index]
-        for k in range(prod(field.shape)):
-            if name in _PERMUTED:
-                continue
-            if field.base == np.complex64:
-                yield from ((0, at + 2 * k), (1, at + 2 * k + 1))
-            else:
-                yield int(name in _TURNS), at + k
+        size = field.itemsize // np.dtype(np.float32).itemsize
+        for k in range(size):
+            turns = k % 2 == 1 if field.base == np.complex64 else name in _TURNS
+            yield at + (-k % size if name == "looks" else k), -1 if turns else 1
+        at += size
 
 
 def _steps_of(s: TrainSettings) -> int:

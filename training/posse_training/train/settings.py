@@ -136,7 +136,7 @@ class TrainSettings:
     # cmaes; num_worlds is the number that each candidate plays, for whole episodes
     population: int = number(16, "", 4, 1000)
     """Candidates in a generation."""
-    deviation: float = number(0.03, "", 1e-6, 10)
+    deviation: float = number(0.02, "", 1e-6, 10)
     """Standard deviation of the weights at the start."""
 
     # A warm start
