@@ -24,9 +24,10 @@ from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.safeguard import MOTION
-from posse_training.errors import require
+from posse_training.errors import RunFolderError, require
 from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.files import intact
+from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
@@ -53,10 +54,16 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     basis = _basis(encoding)
     scores: list[list[float]] = []
     curve: list[Point] = []
-    seconds = 0.0
+    seconds, versions = 0.0, software("cmaes", "numpy")
     if (folder / STATE).is_file():
         with intact(folder / STATE):
-            scores, curve, seconds = read_json(folder / STATE)
+            kept = read_json(folder / STATE)
+            scores, curve, seconds, begun = (kept[name] for name in ("scores", "curve", "seconds", "software"))
+        if begun != versions:
+            raise RunFolderError(
+                f"{folder} was begun with {begun}, and this is {versions}: other versions draw other candidates. "
+                "Train again in another --out"
+            )
         display.note(f"resuming {folder} at generation {len(scores)}")
     started = time.monotonic() - seconds
 
@@ -107,7 +114,9 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.progress(steps, float(np.mean(scores[-1])))
         if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every or generation + 1 == generations:
             evaluate(steps)
-        write_json(folder / STATE, [scores, curve, time.monotonic() - started], indent=None)
+        seconds = time.monotonic() - started
+        state = {"scores": scores, "curve": curve, "seconds": seconds, "software": versions}
+        write_json(folder / STATE, state, indent=None)
     policy(cma.mean, make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
 

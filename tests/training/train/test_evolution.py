@@ -1,0 +1,69 @@
+"""Evolution of a correction: it begins as the script, resumes exactly, and treats a mirrored world as the world."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+from tests.support.runs import BELIEVING, killed_at, quiet, resume, small
+
+import posse
+from posse_baselines import begin, load
+from posse_training.errors import RunFolderError, SettingsError
+from posse_training.evaluation import evaluate
+from posse_training.train import evolution
+from posse_training.train.train import train
+
+EVOLVED: dict[str, Any] = {**BELIEVING, "population": 4, "deviation": 0.5, "steps": 6000, "evaluate_every": 2560}
+
+
+def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
+    settings = small(tmp_path, "cmaes", **EVOLVED)
+    best = train(settings, console=quiet())
+    with (tmp_path / "curve.csv").open(newline="") as lines:
+        curve = {int(float(row["steps"])): float(row["safe_score"]) for row in csv.DictReader(lines)}
+    assert list(curve) == [0, 2560, 5120, 6400], "four candidates, four worlds, two trackers, 40 steps: 1,280"
+    for policy, score in (("ddcs-tuned", curve[0]), (load(best), max(curve.values()))):
+        played = evaluate(policy, settings.scenarios[0], 3, 0, split="validation", progress=False)
+        assert played["safe_score"].mean() == pytest.approx(score, abs=1e-12)
+
+
+def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -> None:
+    train(small(tmp_path / "whole", "cmaes", **EVOLVED), console=quiet())
+    with killed_at(evolution, "write_json", 3):
+        train(small(tmp_path / "cut", "cmaes", **EVOLVED), console=quiet())
+    resume(tmp_path / "cut")
+    mine, other = (load_file(tmp_path / name / "last.safetensors") for name in ("whole", "cut"))
+    assert mine.keys() == other.keys()
+    assert all(np.array_equal(mine[name], other[name]) for name in mine)
+    assert np.any(mine["layers.0.weight"] != 0.0)
+    state = json.loads((tmp_path / "cut" / "state.json").read_text())
+    (tmp_path / "cut" / "state.json").write_text(json.dumps({**state, "software": {"numpy": "1.0"}}))
+    with pytest.raises(RunFolderError, match="other versions draw other candidates"):
+        resume(tmp_path / "cut")
+
+
+def test_a_mirrored_world_is_corrected_as_the_world(tmp_path: Path) -> None:
+    """Three trackers and a target, and the same with every y and every heading turned round."""
+    train(small(tmp_path, "cmaes", **{**EVOLVED, "scenario": "constant", "steps": 1280}), console=quiet())
+    policy: Any = load(tmp_path / "last.safetensors")
+    script, actions = load("ddcs-tuned"), {}
+    for side in (1.0, -1.0):
+        batch = posse.batch("constant", 1, num_trackers=3, message_size=policy.message_size)
+        poses = np.array([[[1.0, 2.0, 0.3], [-3.0, 1.0, -0.4], [2.0, -3.0, 1.0]]]) * (1.0, side, side)
+        observations = batch.reset(options={"tracker_pose": poses, "target_pose": [[4.0, side, 0.5 * side]]})
+        for team in (policy, script):
+            actions[team.name, side] = team.act(observations, begin(team, batch))[0][0, :, :2]
+    there, mirrored = actions[policy.name, 1.0], actions[policy.name, -1.0]
+    assert np.abs(there - actions[script.name, 1.0]).max() > 0.01, "it corrects"
+    np.testing.assert_allclose(mirrored, there * (1.0, -1.0), rtol=1e-3, atol=1e-3)
+
+
+def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
+    for changes, message in (({}, "use --preset residual"), ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs")):
+        with pytest.raises(SettingsError, match=message):
+            train(small(tmp_path / "run", "cmaes", **changes), console=quiet())
+        assert not (tmp_path / "run").exists()
