@@ -151,7 +151,7 @@ ALGORITHMS: Final = {
 }
 """By name; a new algorithm is an entry here, and the function that makes it."""
 EVOLUTION: Final = "cmaes"
-"""The algorithm that has no model of stable-baselines3 (:mod:`posse_training.train.evolution`)."""
+"""The algorithm that has no model of stable-baselines3 (:mod:`posse_training.evolution`)."""
 
 
 def algorithm_of(name: str) -> Algorithm:

@@ -16,12 +16,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
+from posse_training.evolution import evolve
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
 from posse_training.train.display import Display, make_logger
-from posse_training.train.evolution import evolve
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics

@@ -12,9 +12,9 @@ from tests.support.runs import BELIEVING, killed_at, quiet, resume, small
 
 import posse
 from posse_baselines import begin, load
+from posse_training import evolution
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation import evaluate
-from posse_training.train import evolution
 from posse_training.train.train import train
 
 EVOLVED: dict[str, Any] = {**BELIEVING, "population": 4, "deviation": 0.5, "steps": 6000, "evaluate_every": 2560}

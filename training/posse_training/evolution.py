@@ -13,7 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
-from posse_training.train.settings import BEST, CURVE, LAST, Point, TrainSettings
+from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
 from posse_training.train.validation import validate
 from posse_training.train.worlds import adviser_of, pairings
 from posse_training.tune import advance
@@ -52,20 +52,18 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     s, encoding = settings, Encoding(settings.encoding, 0, ())
     basis = _basis(encoding)
-    scores: list[list[float]] = []
-    curve: list[Point] = []
-    seconds, versions = 0.0, software("cmaes", "numpy")
+    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0, "software": software("cmaes", "numpy")}
     if (folder / STATE).is_file():
         with intact(folder / STATE):
             kept = read_json(folder / STATE)
-            scores, curve, seconds, begun = (kept[name] for name in ("scores", "curve", "seconds", "software"))
-        if begun != versions:
+            begun, state = kept["software"], {**{name: kept[name] for name in state}, "software": state["software"]}
+        if begun != state["software"]:
             raise RunFolderError(
-                f"{folder} was begun with {begun}, and this is {versions}: other versions draw other candidates. "
-                "Train again in another --out"
+                f"{folder} was begun with {begun}, and this is {state['software']}: other versions draw other "
+                "candidates. Train again in another --out"
             )
-        display.note(f"resuming {folder} at generation {len(scores)}")
-    started = time.monotonic() - seconds
+        display.note(f"resuming {folder} at generation {len(state['scores'])}")
+    scores, curve, started = state["scores"], state["curve"], time.monotonic() - state["seconds"]
 
     def policy(point: npt.NDArray[np.float64], card: dict[str, Any]) -> LearnedPolicy:
         """Return the correction of these weights."""
@@ -80,11 +78,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         shard = range(first, first + s.num_worlds)
         found = []
         for team in (policy(point, {}) for point in points):
-            played = []
-            for pair in pairings(s):
-                target: Any = pair.opponent
-                match = Match(team, target, pair.scenario, s.seed, "train")
-                played.append(play_shard(match, shard, num_threads=num_threads)["safe_score"])
+            matches = [Match(team, cast("Any", p.opponent), p.scenario, s.seed, "train") for p in pairings(s)]
+            played = [play_shard(match, shard, num_threads=num_threads)["safe_score"] for match in matches]
             found.append(float(np.mean(played)))
         return found
 
@@ -114,8 +109,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.progress(steps, float(np.mean(scores[-1])))
         if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every or generation + 1 == generations:
             evaluate(steps)
-        seconds = time.monotonic() - started
-        state = {"scores": scores, "curve": curve, "seconds": seconds, "software": versions}
+        state["seconds"] = time.monotonic() - started
         write_json(folder / STATE, state, indent=None)
     policy(cma.mean, make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
