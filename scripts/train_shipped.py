@@ -20,12 +20,13 @@ from posse_training.train.train import train
 ALGORITHMS: Final = {
     "smart": "ppo",
     "radio": "ppo",
-    "leader-loss": "ppo",
-    "obstacles": "ppo",
+    "leader-loss": "cmaes",
+    "obstacles": "cmaes",
     "field": "mappo",
-    "search": "mappo",
+    "search": "cmaes",
+    "robots": "cmaes",
 }
-"""Scenarios with a correction of their own, ``corrected-SCENARIO``, and how it is trained."""
+"""Scenarios with a correction of their own, ``corrected-SCENARIO`` or ``learned-robots``, and how it is trained."""
 FROM_NOTHING: Final = ("smart", "radio")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SEEDS: Final = {"smart": 5, "field": 5}

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterable, Sequence
 
 import posse
-from posse_training.train.presets import default_settings
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -34,16 +33,6 @@ def all_settings() -> str:
         shown = "" if default is dataclasses.MISSING else code(value(default))
         rows.append((code(name), shown, setting.unit, setting.range, setting.meaning))
     return table(("setting", "default", "unit", "range", "meaning"), rows)
-
-
-def training_defaults() -> str:
-    """Return the settings of the preset ``residual``, by ``ppo``, that differ most between scenarios."""
-    names = ("steps", "log_deviation", "final_log_deviation", "discount")
-    rows = []
-    for scenario in posse.scenario_names():
-        chosen = default_settings(scenario, preset="residual").to_dict()
-        rows.append((code(scenario), f"{chosen['steps']:,}", *(code(chosen[name]) for name in names[1:])))
-    return table(("scenario", *(code(f"--{name.replace('_', '-')}") for name in names)), rows)
 
 
 def changed_settings(scenario: str) -> str:

@@ -40,7 +40,6 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "all_settings": declared_tables.all_settings,
     "observation": declared_tables.observation,
     "metrics": declared_tables.metrics,
-    "training_defaults": declared_tables.training_defaults,
     "reward_terms": declared_tables.reward_terms,
     "replay": replays.replay,
     "leaderboard": standings.leaderboard,

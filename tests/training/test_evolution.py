@@ -15,6 +15,7 @@ from posse_baselines import begin, load
 from posse_training import evolution
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation import evaluate
+from posse_training.train import default_settings
 from posse_training.train.train import train
 
 EVOLVED: dict[str, Any] = {**BELIEVING, "population": 4, "deviation": 0.5, "steps": 6000, "evaluate_every": 2560}
@@ -62,8 +63,17 @@ def test_a_mirrored_world_is_corrected_as_the_world(tmp_path: Path) -> None:
     np.testing.assert_allclose(mirrored, there * (1.0, -1.0), rtol=1e-3, atol=1e-3)
 
 
+def test_its_defaults_correct_the_tuned_script() -> None:
+    found = default_settings("robots", "cmaes")
+    assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
+    assert found == default_settings("robots", "cmaes", preset="residual")
+
+
 def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
-    for changes, message in (({}, "use --preset residual"), ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs")):
+    for changes, message in (
+        ({}, "corrects a script: set advise"),
+        ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs"),
+    ):
         with pytest.raises(SettingsError, match=message):
             train(small(tmp_path / "run", "cmaes", **changes), console=quiet())
         assert not (tmp_path / "run").exists()

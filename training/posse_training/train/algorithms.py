@@ -174,7 +174,7 @@ def check_algorithm(settings: TrainSettings) -> None:
     name = settings.algorithm
     if name == EVOLUTION:
         if settings.advise is None:
-            raise SettingsError(f"algorithm={name!r} learns a correction of a script: use --preset residual")
+            raise SettingsError(f"algorithm={name!r} corrects a script: set advise, for example to ddcs-tuned")
         if settings.start is not None:
             raise SettingsError(f"start={settings.start!r} needs another algorithm than {name}: leave it out")
         return

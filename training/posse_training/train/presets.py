@@ -23,7 +23,7 @@ def default_settings(
         algorithm: One of the algorithms.
         side: What learns; a target learns from nothing, whatever the preset.
         preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn a correction of
-            a scripted team, on policy or by cmaes.
+            a scripted team, on policy; cmaes always learns that.
 
     Raises:
         SettingsError: An unknown algorithm, or a correction off policy.
@@ -32,12 +32,12 @@ def default_settings(
     if algorithm != EVOLUTION:
         tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm, scenario
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
-    learns: str = preset
+    learns: str = "residual" if algorithm == EVOLUTION else preset
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
         learns = "target"
     elif preset == "residual" and "off-policy" in tables:
-        raise SettingsError(f"preset='residual' goes with ppo, mappo or cmaes, not {algorithm}: use the preset nothing")
+        raise SettingsError(f"preset='residual' goes with ppo or mappo, not {algorithm}: use the preset nothing")
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
     for name in ("every", learns):
