@@ -33,7 +33,7 @@ from posse_training.train.display import Display
 from posse_training.train.export import make_card
 from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
 from posse_training.train.validation import validate
-from posse_training.train.worlds import adviser_of, pairings
+from posse_training.train.worlds import adviser_of, divided
 from posse_training.tune import advance
 
 STATE: Final = "state.json"
@@ -74,13 +74,15 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     def play(points: list[npt.NDArray[np.float64]]) -> list[float]:
         """Return the mean safe score of each candidate on the worlds of the present generation."""
-        first = len(scores) * s.num_worlds
-        shard = range(first, first + s.num_worlds)
+        first, parts = len(scores) * s.num_worlds, divided(s)
         found = []
         for team in (policy(point, {}) for point in points):
-            matches = [Match(team, cast("Any", p.opponent), p.scenario, s.seed, "train") for p in pairings(s)]
-            played = [play_shard(match, shard, num_threads=num_threads)["safe_score"] for match in matches]
-            found.append(float(np.mean(played)))
+            played = []
+            for pair, worlds in parts:
+                match = Match(team, cast("Any", pair.opponent), pair.scenario, s.seed, "train")
+                shard = range(first + worlds.start, first + worlds.stop)
+                played.append(play_shard(match, shard, num_threads=num_threads)["safe_score"])
+            found.append(float(np.mean(np.concatenate(played))))
         return found
 
     def evaluate(steps: int) -> None:
@@ -152,5 +154,5 @@ def _mirrored(record: np.dtype[Any], start: int) -> Iterator[tuple[int, int]]:
 
 def _steps_of(s: TrainSettings) -> int:
     """Return the steps that a candidate is played for."""
-    parts = [blocks(pair.scenario, range(s.num_worlds), seed=s.seed, split="train") for pair in pairings(s)]
+    parts = [blocks(pair.scenario, worlds, seed=s.seed, split="train") for pair, worlds in divided(s)]
     return sum(len(worlds) * one.horizon * one.num_trackers for part in parts for one, worlds in part)

@@ -93,8 +93,12 @@ def adviser_of(settings: TrainSettings) -> Policy | None:
     return adviser
 
 
-def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
-    """Return batches of worlds, divided among the pairings by their shares."""
+def divided(settings: TrainSettings) -> list[tuple[Pairing, range]]:
+    """Return every pairing with its part of the worlds, by their shares.
+
+    Raises:
+        SettingsError: Fewer worlds than scenarios and opponents.
+    """
     pairs = pairings(settings)
     ends = np.cumsum([0, *(pair.share for pair in pairs)])
     edges = (settings.num_worlds * ends // ends[-1]).tolist()
@@ -102,17 +106,22 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
         raise SettingsError(
             f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
         )
+    return [(pair, range(*edge)) for pair, edge in zip(pairs, pairwise(edges), strict=True)]
+
+
+def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
+    """Return batches of worlds, divided among the pairings."""
     batches: list[posse.Batch] = []
-    for pair, (first, last) in zip(pairs, pairwise(edges), strict=True):
+    for pair, worlds in divided(settings):
         scenario = pair.scenario
         if settings.end_on_contact:
             scenario = scenario.replace(terminate_on_contact=True)
         batches += posse.batches(
             scenario,
-            last - first,
+            len(worlds),
             scenarios=settings.family_scenarios,
             seed=settings.seed,
-            first_world=first,
+            first_world=worlds.start,
             autoreset="disabled",
             num_threads=num_threads,
             **pair.inside,
