@@ -17,20 +17,25 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-ALGORITHMS: Final = {
-    "smart": "ppo",
-    "radio": "ppo",
-    "leader-loss": "cmaes",
-    "obstacles": "cmaes",
-    "field": "mappo",
-    "search": "cmaes",
-    "robots": "cmaes",
+CORRECTIONS: Final = {
+    "corrected-smart": "ppo",
+    "corrected-radio": "ppo",
+    "corrected-leader-loss": "cmaes",
+    "corrected-obstacles": "cmaes",
+    "corrected-field": "mappo",
+    "corrected-search": "cmaes",
+    "learned-robots": "cmaes",
 }
-"""Scenarios with a correction of their own, ``corrected-SCENARIO`` or ``learned-robots``, and how it is trained."""
+"""Teams that correct the script on the scenario of their name, and how they are trained."""
 FROM_NOTHING: Final = ("smart", "radio")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SEEDS: Final = {"smart": 5, "field": 5}
 """Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
+
+
+def scenario_of(team: str) -> str:
+    """Return the scenario that a team is named after."""
+    return team.partition("-")[2]
 
 
 @dataclass(frozen=True)
@@ -39,25 +44,28 @@ class Settings:
 
     seed: tuple[int, ...] = ()
     """Training seeds; default: 1 to 3, of the corrections for smart and field 1 to 5."""
-    scenario: tuple[str, ...] = tuple(ALGORITHMS)
+    scenario: tuple[str, ...] = tuple(map(scenario_of, CORRECTIONS))
     """Scenarios to train on."""
     out: Path = Path("runs/shipped")
-    """Folder of the run folders corrected-SCENARIO-SEED and learned-SCENARIO-SEED."""
+    """Folder of the run folders, TEAM-SEED."""
 
 
 def all_runs(settings: Settings) -> list[TrainSettings]:
     """Return the settings of all runs, the first seed of every scenario first."""
     for name in settings.scenario:
-        if name not in ALGORITHMS:
-            known = ", ".join(ALGORITHMS)
-            raise SettingsError(f"scenario={name!r:.80} has no learned team of its own; those that have: {known}")
+        if name not in (known := [scenario_of(team) for team in CORRECTIONS]):
+            raise SettingsError(
+                f"scenario={name!r:.80} has no learned team of its own; those that have: {', '.join(known)}"
+            )
     runs = []
     for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
-        for name in settings.scenario:
-            if settings.seed or seed <= SEEDS.get(name, 3):
-                corrects = default_settings(name, ALGORITHMS[name], preset="residual")
-                runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
-            if name in FROM_NOTHING and (settings.seed or seed <= 3):
+        for team, algorithm in CORRECTIONS.items():
+            name = scenario_of(team)
+            if name in settings.scenario and (settings.seed or seed <= SEEDS.get(name, 3)):
+                corrects = default_settings(name, algorithm, preset="residual")
+                runs.append(replace(corrects, seed=seed, folder=settings.out / f"{team}-{seed}"))
+        for name in FROM_NOTHING:
+            if name in settings.scenario and (settings.seed or seed <= 3):
                 learns = default_settings(name)
                 runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
