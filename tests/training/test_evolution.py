@@ -41,9 +41,9 @@ def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -
     assert mine.keys() == other.keys()
     assert all(np.array_equal(mine[name], other[name]) for name in mine)
     assert np.any(mine["layers.0.weight"] != 0.0)
-    state = json.loads((tmp_path / "cut" / "state.json").read_text())
-    (tmp_path / "cut" / "state.json").write_text(json.dumps({**state, "software": {"numpy": "1.0"}}))
-    with pytest.raises(RunFolderError, match="other versions draw other candidates"):
+    versions = json.loads((tmp_path / "cut" / "software.json").read_text())
+    (tmp_path / "cut" / "software.json").write_text(json.dumps({**versions, "numpy": "1.0"}))
+    with pytest.raises(RunFolderError, match=r"numpy"):
         resume(tmp_path / "cut")
 
 

@@ -24,20 +24,21 @@ from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.safeguard import MOTION
-from posse_training.errors import RunFolderError, require
+from posse_training.errors import require
 from posse_training.evaluation.episodes import Match, play_shard
-from posse_training.files import intact
+from posse_training.files import hold_settings, intact
 from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
+from posse_training.train.networks import LIMIT
 from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
 from posse_training.train.validation import validate
 from posse_training.train.worlds import adviser_of, divided
 from posse_training.tune import advance
 
+SOFTWARE: Final = "software.json"
 STATE: Final = "state.json"
-_LIMIT: Final = 10.0  # of an input; all are bounded by less
 _TURNS: Final = ("turn_rate", "law_turn", "frame_rate")
 """Inputs whose sign a mirror changes, beside the second number of every vector."""
 
@@ -52,16 +53,12 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     s, encoding = settings, Encoding(settings.encoding, 0, ())
     basis = _basis(encoding)
-    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0, "software": software("cmaes", "numpy")}
+    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
+    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
         with intact(folder / STATE):
             kept = read_json(folder / STATE)
-            begun, state = kept["software"], {**{name: kept[name] for name in state}, "software": state["software"]}
-        if begun != state["software"]:
-            raise RunFolderError(
-                f"{folder} was begun with {begun}, and this is {state['software']}: other versions draw other "
-                "candidates. Train again in another --out"
-            )
+            state = {name: kept[name] for name in state}
         display.note(f"resuming {folder} at generation {len(state['scores'])}")
     scores, curve, started = state["scores"], state["curve"], time.monotonic() - state["seconds"]
 
@@ -69,7 +66,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         """Return the correction of these weights."""
         weights = np.tensordot(point.astype(np.float32), basis, 1)
         zeros, ones = np.zeros(weights.shape[1], np.float32), np.ones(weights.shape[1], np.float32)
-        network = Network(zeros, ones, _LIMIT, (weights,), (zeros[:MOTION],), s.activation, "clip")
+        network = Network(zeros, ones, LIMIT, (weights,), (zeros[:MOTION],), s.activation, "clip")
         return LearnedPolicy(network, encoding, card, adviser_of(s))
 
     def play(points: list[npt.NDArray[np.float64]]) -> list[float]:

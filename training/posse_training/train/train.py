@@ -26,9 +26,9 @@ from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings
-from posse_training.train.validation import first_statistics, score_beside, validate
+from posse_training.train.validation import LOAD, first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import adviser_of, load_own, make_env, pairings
+from posse_training.train.worlds import adviser_of, make_env, pairings
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -100,7 +100,7 @@ def check_before(settings: TrainSettings) -> None:
     pairings(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
-            load_own(settings, policy)
+            LOAD[settings.side](policy)
     if settings.start is not None:
         checkpoint.read_checkpoint(Path(settings.start))
 

@@ -7,15 +7,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse_baselines import PolicyError, Target
+from posse_baselines import PolicyError, Target, load, load_target
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import mean
 from posse_training.train.display import Display
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import load_own, make_env, pairings
+from posse_training.train.worlds import make_env, pairings
 
 VALIDATION_SEED: Final = 0
+LOAD: Final[dict[str, Any]] = {"trackers": load, "target": load_target}
+"""How a policy of each side is found by name."""
 _WARM_WORLDS: Final = 32
 _WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's proposals
 _HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
@@ -44,7 +46,7 @@ def score_beside(settings: TrainSettings, display: Display) -> float | None:
         return None
     display.note(f"evaluating {settings.beside} on the validation worlds")
     try:
-        return validate(settings, load_own(settings, settings.beside))["safe_score"]
+        return validate(settings, LOAD[settings.side](settings.beside))["safe_score"]
     except PolicyError as error:
         display.note(f"no score of {settings.beside}: {error}")
         return None

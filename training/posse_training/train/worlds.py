@@ -63,11 +63,7 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
 
 
 def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVecEnv:
-    """Return the training worlds, of the split ``"train"``, stepped by so many threads.
-
-    Raises:
-        SettingsError: Fewer worlds than scenarios and opponents.
-    """
+    """Return the training worlds, of the split ``"train"``, stepped by so many threads."""
     batches = _make_batches(settings, num_threads)
     layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
     if settings.side == "target":  # it hears no messages
@@ -127,12 +123,3 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
             **pair.inside,
         )
     return batches
-
-
-def load_own(settings: TrainSettings, name: str) -> Any:
-    """Return a policy of the learning side by name: a team's, or a target.
-
-    Raises:
-        PolicyError: It is unknown.
-    """
-    return load_target(name) if settings.side == "target" else load(name)
