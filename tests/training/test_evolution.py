@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
-from tests.support.runs import BELIEVING, killed_at, quiet, resume, small
+from tests.support.runs import BELIEVING, TARGET, killed_at, quiet, resume, small
 
 import posse
 from posse_baselines import begin, load

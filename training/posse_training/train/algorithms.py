@@ -172,17 +172,19 @@ def check_algorithm(settings: TrainSettings) -> None:
         SettingsError: The message names the setting.
     """
     name = settings.algorithm
-    if name == EVOLUTION:
+    kind = None if name == EVOLUTION else algorithm_of(name)
+    if settings.side == "target" and (kind is None or kind.reads_state):
+        raise SettingsError(
+            f"algorithm={name!r} does not go with side='target', which observes all and corrects no script: use ppo"
+        )
+    if kind is None:
         if settings.advise is None:
             raise SettingsError(f"algorithm={name!r} corrects a script: set advise, for example to ddcs-tuned")
-        if settings.start is not None:
-            raise SettingsError(f"start={settings.start!r} needs another algorithm than {name}: leave it out")
-        return
-    kind = algorithm_of(name)
-    if settings.imitate is not None and not kind.on_policy:
+        for other in ("start", "wandb"):
+            if (value := getattr(settings, other)) is not None:
+                raise SettingsError(f"{other}={value!r} needs another algorithm than {name}: leave it out")
+    elif settings.imitate is not None and not kind.on_policy:
         raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
-    if settings.side == "target" and kind.reads_state:
-        raise SettingsError(f"algorithm={name!r} does not go with side='target', which observes everything: use ppo")
 
 
 def even_minibatch(rows: int, wanted: int) -> int:
