@@ -73,6 +73,7 @@ def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
     for changes, message in (
         ({}, "corrects a script: set advise"),
         ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs"),
+        (TARGET, "corrects no script: use ppo"),
     ):
         with pytest.raises(SettingsError, match=message):
             train(small(tmp_path / "run", "cmaes", **changes), console=quiet())
