@@ -4,8 +4,8 @@ Where a script is near its best, the noise that exploration adds to each action 
 candidate keeps its weights for whole episodes, all candidates of a generation play the same worlds, and what counts is
 the safe score itself. Reference: Hansen, The CMA Evolution Strategy, 2016.
 
-A mirror image of a world is a world. The output ahead therefore reads only inputs that a mirror leaves as they are,
-and the output to the left only those that it turns round.
+The mirror image of a world is a world. The output ahead therefore reads only inputs that keep their sign in a mirror,
+and the output to the left only those that change it.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
 
 def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:
-    """Return the weights (number, MOTION, inputs) that a correction adds up, each as its number in a point says."""
+    """Return patterns (P, MOTION, inputs): their sum, weighted by a point's P numbers, is a network's weights."""
     images = list(_images(encoding))
     basis = []
     for column, (image, sign) in enumerate(images):
@@ -129,7 +129,7 @@ def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:
 
 
 def _images(encoding: Encoding) -> Iterator[tuple[int, int]]:
-    """Yield the input that each becomes in a mirror, and its sign there: features, the script's wish, its belief."""
+    """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
     if encoding.with_features:
         yield from _mirrored(FEATURES, 0)
     yield from ((encoding.size, 1), (encoding.size + 1, -1))
@@ -138,7 +138,7 @@ def _images(encoding: Encoding) -> Iterator[tuple[int, int]]:
 
 
 def _mirrored(record: np.dtype[Any], start: int) -> Iterator[tuple[int, int]]:
-    """Yield the same of the numbers of a record, which begins at an input; ``looks`` go round the tracker."""
+    """Yield the same for a record whose first number is input ``start``; ``looks`` are directions round the tracker."""
     at = start
     for name in record.names or ():
         field = record[name]
