@@ -101,13 +101,6 @@ def killed_at(owner: Any, name: str, call: int) -> Iterator[None]:
             yield
 
 
-ADVISED: dict[str, Any] = {
-    "scenario": "field",
-    "advise": "ddcs-distributed",
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
-}
-BELIEVING: dict[str, Any] = {**ADVISED, "advise": "ddcs-tuned", "encoding": "belief", "end_on_contact": True}
-"""With the settings of a correction: adviser, belief, a contact ends an episode."""
 GUARDED: dict[str, Any] = {
     "scenario": "smart",
     "safeguard": True,

@@ -77,9 +77,9 @@ INVALID = {
     f"train --steps {10**30}": "steps=",
     "train --beside nobody": "unknown policy 'nobody'",
     "train --beside :x": "':x' names no class",
-    "train --imitate pursuit": "safeguard=True goes with neither advise",
+    "train --imitate pursuit": "safeguard=True does not go with imitate='pursuit'",
     "train --no-safeguard --imitate nobody": "unknown policy 'nobody'",
-    "train --no-safeguard --advise planner": "'planner'",
+    "train --preset residual --advise planner": "'planner'",
     "train --wandb project": "pip install wandb",
 }
 

@@ -2,24 +2,27 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
-from tests.support.runs import BELIEVING, TARGET, killed_at, quiet, resume, small
+from tests.support.runs import TARGET, killed_at, quiet, resume, small
 
 import posse
 from posse_baselines import begin, load
 from posse_training import evolution
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation import evaluate
+from posse_training.evolution import Candidates
 from posse_training.train import default_settings
 from posse_training.train.train import train
 
 EVOLVED: dict[str, Any] = {
-    **BELIEVING,
+    "advise": "ddcs-tuned",
+    "encoding": "belief",
     "scenario": "constant",
     # So near to the target that slots are held from the start on.
     "overrides": {"horizon": 40, "settle_time": 1.0, "start_distance": (1.0, 2.0)},
@@ -76,13 +79,39 @@ def test_a_mirrored_world_is_corrected_as_the_world(tmp_path: Path) -> None:
 def test_its_defaults_correct_the_tuned_script() -> None:
     found = default_settings("robots", "cmaes")
     assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
-    assert found == default_settings("robots", "cmaes", preset="residual")
+    assert found == default_settings("robots", preset="residual")
+    with pytest.raises(SettingsError, match="preset='residual' goes with cmaes, not ppo"):
+        default_settings("robots", "ppo", preset="residual")
+
+
+def test_another_run_is_where_it_begins(tmp_path: Path) -> None:
+    train(small(tmp_path / "a", "cmaes", **EVOLVED), console=quiet())
+    further = small(tmp_path / "b", "cmaes", **EVOLVED, start=str(tmp_path / "a"))
+    train(replace(further, deviation=1e-6, steps=1), console=quiet())
+    mine, other = (load_file(tmp_path / name / "last.safetensors")["layers.0.weight"] for name in "ab")
+    np.testing.assert_allclose(other, mine, atol=1e-4)
+    with pytest.raises(RunFolderError, match=r"has no state\.json"):
+        train(replace(further, folder=tmp_path / "c", start=str(tmp_path)), console=quiet())
+    assert not (tmp_path / "c").exists()
+
+
+def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
+    """Each of three at once has the score that it has alone, in two worlds of each of two opponents."""
+    changes = {**EVOLVED, "overrides": {**EVOLVED["overrides"], "horizon": 200}, "num_worlds": 4}
+    settings = small(tmp_path, "cmaes", **changes, target="smart,evader")
+    weights = np.zeros((3, 2, 77), np.float32)
+    weights[1:] = np.random.default_rng(0).normal(0.0, 0.05, (2, 2, 77))
+    together = Candidates(settings, weights, {}).scores(5, None)
+    alone = [Candidates(settings, weights[k : k + 1], {}).scores(5, None)[0] for k in range(3)]
+    assert together == pytest.approx(alone, abs=0.02)
+    assert np.ptp(alone) > 0.05
 
 
 def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
     for changes, message in (
         ({}, "corrects a script: set advise"),
-        ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs"),
+        ({**EVOLVED, "imitate": "idle"}, "imitate='idle' does not go with cmaes"),
+        ({**EVOLVED, "message_size": 2}, "message_size=2 does not go with cmaes"),
         (TARGET, "corrects no script: use ppo"),
     ):
         with pytest.raises(SettingsError, match=message):

@@ -24,11 +24,11 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         targets=("smart",),
         target_steps=160,
         team_steps=320,
-        response_steps=160,
         episodes=3,
         overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
         training={
             "num_worlds": 16,
+            "population": 4,
             "rollout": 5,
             "minibatch": 32,
             "epochs": 1,

@@ -18,14 +18,15 @@ from typing import Any, Final, cast
 import numpy as np
 import numpy.typing as npt
 
+from posse.numeric import FloatArray
 from posse.scenarios.family import blocks
+from posse_baselines import Policy, batch_for, load, rollout
 from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
-from posse_baselines.safeguard import MOTION
-from posse_training.errors import require
-from posse_training.evaluation.episodes import Match, play_shard
+from posse_baselines.safeguard import MOTION, check_adviser
+from posse_training.errors import RunFolderError, require
 from posse_training.files import hold_settings, intact
 from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
@@ -34,7 +35,7 @@ from posse_training.train.export import make_card
 from posse_training.train.networks import LIMIT
 from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
 from posse_training.train.validation import validate
-from posse_training.train.worlds import adviser_of, divided
+from posse_training.train.worlds import divided
 from posse_training.tune import advance
 
 SOFTWARE: Final = "software.json"
@@ -51,10 +52,10 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     require("training", "cmaes")
     from cmaes import CMA
 
-    s, encoding = settings, Encoding(settings.encoding, 0, ())
-    basis = _basis(encoding)
+    s = settings
+    basis = _basis(_encoding(s))
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
-    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
+    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0, "mean": []}
     if (folder / STATE).is_file():
         with intact(folder / STATE):
             kept = read_json(folder / STATE)
@@ -62,38 +63,28 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.note(f"resuming {folder} at generation {len(state['scores'])}")
     scores, curve, started = state["scores"], state["curve"], time.monotonic() - state["seconds"]
 
-    def policy(point: npt.NDArray[np.float64], card: dict[str, Any]) -> LearnedPolicy:
-        """Return the correction of these weights."""
-        weights = np.tensordot(point.astype(np.float32), basis, 1)
-        zeros, ones = np.zeros(weights.shape[1], np.float32), np.ones(weights.shape[1], np.float32)
-        network = Network(zeros, ones, LIMIT, (weights,), (zeros[:MOTION],), s.activation, "clip")
-        return LearnedPolicy(network, encoding, card, adviser_of(s))
+    def policy(card: dict[str, Any]) -> LearnedPolicy:
+        """Return the correction at the mean of the search."""
+        return Candidates(s, np.tensordot(cma.mean.astype(np.float32), basis, 1)[None], card)
 
     def play(points: list[npt.NDArray[np.float64]]) -> list[float]:
         """Return the mean safe score of each candidate on the worlds of the present generation."""
-        first, parts = len(scores) * s.num_worlds, divided(s)
-        found = []
-        for team in (policy(point, {}) for point in points):
-            played = []
-            for pair, worlds in parts:
-                match = Match(team, cast("Any", pair.opponent), pair.scenario, s.seed, "train")
-                shard = range(first + worlds.start, first + worlds.stop)
-                played.append(play_shard(match, shard, num_threads=num_threads)["safe_score"])
-            found.append(float(np.mean(np.concatenate(played))))
-        return found
+        team = Candidates(s, np.tensordot(np.array(points, np.float32), basis, 1), {})
+        return team.scores(len(scores) * s.num_worlds, num_threads)
 
     def evaluate(steps: int) -> None:
         """Score the mean of the search on the validation worlds; keep it if it is the best so far."""
         point = {"steps": float(steps), "seconds": time.monotonic() - started}
-        point |= validate(s, policy(cma.mean, {}))
+        point |= validate(s, policy({}))
         best = max((earlier["safe_score"] for earlier in curve), default=-1.0)
         curve.append(point)
         write_curve(folder / CURVE, curve)
         if point["safe_score"] > best:
-            policy(cma.mean, make_card(s, steps=steps, curve=curve)).save(folder / BEST)
+            policy(make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
-    cma = CMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
+    mean = np.zeros(len(basis)) if s.start is None else mean_of(Path(s.start))
+    cma = CMA(mean=mean, sigma=s.deviation, seed=s.seed, population_size=s.population)
     each = s.population * _steps_of(s)  # of a generation
     generations = -(-s.steps // each)
     display.begin(len(scores) * each, generations * each)
@@ -108,10 +99,74 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.progress(steps, float(np.mean(scores[-1])))
         if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every or generation + 1 == generations:
             evaluate(steps)
-        state["seconds"] = time.monotonic() - started
+        state |= {"seconds": time.monotonic() - started, "mean": cma.mean.tolist()}
         write_json(folder / STATE, state, indent=None)
-    policy(cma.mean, make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
+    policy(make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
+
+
+def adviser_of(settings: TrainSettings) -> Policy:
+    """Return the script that a run corrects.
+
+    Raises:
+        PolicyError: A policy that cannot be an adviser.
+    """
+    adviser = load(str(settings.advise))
+    check_adviser(adviser, believes=settings.encoding == "belief")
+    return adviser
+
+
+def mean_of(folder: Path) -> npt.NDArray[np.float64]:
+    """Return the weights at which a search ended.
+
+    Raises:
+        RunFolderError: The folder holds no search, or one whose state is damaged.
+    """
+    if not (folder / STATE).is_file():
+        raise RunFolderError(f"start={folder} has no {STATE}: name the run folder of a correction")
+    with intact(folder / STATE):
+        return np.array(read_json(folder / STATE)["mean"], np.float64)
+
+
+def _encoding(s: TrainSettings) -> Encoding:
+    return Encoding(s.encoding, 0, ())
+
+
+class Candidates(LearnedPolicy):
+    """C corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
+
+    Args:
+        settings: Of the run.
+        weights: (C, MOTION, inputs).
+        card: Of the first candidate, which a file of this policy holds.
+    """
+
+    def __init__(self, settings: TrainSettings, weights: FloatArray, card: dict[str, Any]) -> None:
+        self._settings, self._weights = settings, weights
+        zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
+        network = Network(zeros, ones, LIMIT, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
+        super().__init__(network, _encoding(settings), card, adviser_of(settings))
+
+    def _forward(self, inputs: FloatArray) -> FloatArray:
+        if len(self._weights) == 1:
+            return super()._forward(inputs)
+        shares = inputs.clip(-LIMIT, LIMIT).reshape(len(self._weights), -1, inputs.shape[1])
+        return (shares @ self._weights.transpose(0, 2, 1)).clip(-1.0, 1.0).reshape(-1, MOTION)
+
+    def scores(self, first: int, num_threads: int | None) -> list[float]:
+        """Return the mean safe score of each candidate, all in the same ``num_worlds`` worlds from number ``first``."""
+        s, count, played = self._settings, len(self._weights), []
+        where: dict[str, Any] = {"seed": s.seed, "split": "train"}
+        for pair, worlds in divided(s):
+            shard = range(first + worlds.start, first + worlds.stop)
+            for one, numbers in blocks(pair.scenario, shard, **where):
+                target = cast("Any", pair.opponent)
+                batch = batch_for(self, one, count * len(numbers), target, num_threads=num_threads, **where)
+                batch.reset()
+                batch.arrays.world["index"] = np.tile(numbers, count)
+                batch.arrays.world["episode"] = -1  # the next one is the first
+                played.append(rollout(batch, self).metrics["safe_score"].reshape(count, -1))
+        return list(map(float, np.concatenate(played, axis=1).mean(axis=1)))
 
 
 def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:

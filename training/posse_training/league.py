@@ -28,6 +28,7 @@ from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked
 from posse_training.options import Changes, Pairs
+from posse_training.train.algorithms import EVOLUTION
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, TrainSettings
 
@@ -42,7 +43,7 @@ TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
-_FREE: Final = ("generations", "responses", "response_steps", "episodes")
+_FREE: Final = ("generations", "responses", "longer", "episodes")
 """Settings that the command that resumes a league may change."""
 _STEPS: Final = (1, 10**12)
 _COLUMNS: Final = 4  # of targets, which fit into 80 characters
@@ -64,13 +65,13 @@ class LeagueSettings:
     targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
     """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
     target_steps: int = number(2_000_000, "", *_STEPS)
-    """Steps of each target's training."""
-    team_steps: int = number(4_000_000, "", *_STEPS)
-    """Steps of each team's training, of one tracker each."""
+    """Steps of each target's training, by ppo."""
+    team_steps: int = number(60_000_000, "", *_STEPS)
+    """Steps of each team's training, of one tracker each: evolution of a correction of ddcs-tuned."""
     responses: Literal["last", "all", "none"] = "last"
     """For which generations a best response is trained, which says how much it can be exploited."""
-    response_steps: int = number(2_000_000, "", *_STEPS)
-    """Steps of the training of a best response."""
+    longer: int = number(1, "", 1, 1000)
+    """How many times as long as a member a best response is trained."""
     episodes: int = number(200, "", 2, 10**8)
     """Test worlds of each pair of a team and a target."""
     seed: int = number(1, "", 0, 2**32 - 1)
@@ -174,7 +175,7 @@ class League:
         if s.opponents == "pfsp" and len(others) > 1:
             hard = {other.policy: self._difficulty(side, own[-1], other) for other in others}
         opponents = ",".join(name for name, part in shares(hard).items() for _ in range(part))
-        self._train(side, trained, opponents, s.target_steps if side == TARGET else s.team_steps, own)
+        self._train(side, trained, opponents, 1, own)
 
     def _exploit(self, side: str, of: list[Member], others: list[Member]) -> None:
         """Train best responses of a side to the last member of the other one, or to all, and note what they gain."""
@@ -185,7 +186,7 @@ class League:
             run = s.path / "responses" / f"{side}-to-{to.label}"
             best = Member(f"response to {to.label}", str(run / BEST), run)
             if not best.trained:
-                self._train(side, best, to.policy, s.response_steps, others)
+                self._train(side, best, to.policy, s.longer, others)
             found = {m.label: self._cell(*((to, m) if side == TARGET else (m, to))) for m in (*others, best)}
             after = found.pop(best.label)
             opponent = max(found, key=lambda label: sign * found[label]["score"].value)
@@ -201,21 +202,22 @@ class League:
             found.append(Member(f"{side}-{generation}", str(run / BEST), run))
         return found
 
-    def _train(self, side: str, trained: Member, opponents: str, steps: int, own: Sequence[Member]) -> None:
-        """Train a member, or resume that; it begins with the networks of its side's latest."""
+    def _train(self, side: str, trained: Member, opponents: str, longer: int, own: Sequence[Member]) -> None:
+        """Train a member so many times as long as usual, or resume that; it begins where its side's latest ended."""
         from posse_training.train.train import train  # torch
 
         s, run = self.settings, trained.run
         assert run is not None
+        steps = longer * (s.target_steps if side == TARGET else s.team_steps)
         self.console.print(f"{trained.label}: {run}", markup=False)
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
-            **default_settings(s.scenario, side=side, preset="residual").to_dict(),
+            **default_settings(s.scenario, EVOLUTION if side == TEAM else None, side=side).to_dict(),
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,
             OPPONENTS[side]: opponents,
-            **({} if start is None else {"start": str(start), "imitate": None}),
+            "start": None if start is None else str(start),
             "folder": str(run),
             "evaluate_every": max(1, steps // 4),
             "checkpoint_every": max(1, steps // 8),

@@ -126,10 +126,14 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         if m.layer is not None:
             m.layer.follow(observations)
             inputs = np.concatenate([inputs, m.layer.inputs.reshape(len(inputs), -1)], axis=1)
-        outputs = forward(self._flat, inputs).reshape(*observations.shape[:2], -1)
+        outputs = self._forward(inputs).reshape(*observations.shape[:2], -1)
         actions = np.zeros((*outputs.shape[:2], MOTION + m.layout.scenario.message_size), np.float32)
         actions[..., : outputs.shape[2]] = outputs
         return actions if m.layer is None else m.layer.actions(actions), m
+
+    def _forward(self, inputs: FloatArray) -> FloatArray:
+        """Return the outputs of the network (E N, 2 + m) for its inputs."""
+        return forward(self._flat, inputs)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with adviser and safeguard restarted in the worlds of a mask (E,)."""

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from tests.support.runs import (
     AGAINST,
-    BELIEVING,
     GUARDED,
     TARGET,
     assert_equal,
@@ -34,7 +33,6 @@ from posse_training.train.train import train
     [
         ("ppo", {}),
         *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "sac", "td3")),
-        ("ppo", BELIEVING),
         ("ppo", GUARDED),
         ("ppo", TARGET),
         ("ppo", AGAINST),

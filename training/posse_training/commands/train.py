@@ -27,7 +27,7 @@ class _Which:
     """What the defaults of all other settings depend on."""
 
     scenario: Names = "smart"
-    algorithm: str = "ppo"
+    algorithm: str | None = None
     side: str = "trackers"
     preset: Preset = "nothing"
 
@@ -37,8 +37,7 @@ class _Arguments(TrainSettings):
     """Settings of a training, and how often and where it is made."""
 
     preset: Preset = "nothing"
-    """Default settings: learn from nothing, that is from random weights; or, on policy, a correction of a scripted
-    team."""
+    """What is learned: a policy from random weights, or by cmaes a correction of a scripted team."""
     seed: Annotated[int, tyro.conf.Suppress] = 1
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(name="seed")] = (1,)
     """Seed of the worlds, the networks and the exploration; or several for as many runs, in turn, or with --ray at

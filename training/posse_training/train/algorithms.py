@@ -56,9 +56,8 @@ def _mappo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 
 def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, **network: Any) -> BaseAlgorithm:
     from stable_baselines3 import PPO
-    from torch import nn
 
-    model = PPO(
+    return PPO(
         policy,
         env,
         n_steps=s.rollout,
@@ -72,11 +71,6 @@ def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, **network: Any) -> 
         policy_kwargs=_network(s, log_std_init=s.log_deviation, **network),
         **_common(s),
     )
-    if s.advise is not None:
-        # The policy begins as its adviser, which small random corrections would already impair.
-        made: Any = model.policy
-        nn.init.zeros_(made.action_net.weight)
-    return model
 
 
 def _sac(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
@@ -180,9 +174,16 @@ def check_algorithm(settings: TrainSettings) -> None:
     if kind is None:
         if settings.advise is None:
             raise SettingsError(f"algorithm={name!r} corrects a script: set advise, for example to ddcs-tuned")
-        for other in ("start", "wandb"):
-            if (value := getattr(settings, other)) is not None:
-                raise SettingsError(f"{other}={value!r} needs another algorithm than {name}: leave it out")
+        for other in ("imitate", "message_size", "safeguard", "wandb"):
+            if value := getattr(settings, other):
+                raise SettingsError(
+                    f"{other}={value!r} does not go with {name}, whose team begins as its adviser, which safeguards "
+                    "and sends messages: leave it out"
+                )
+    elif settings.advise is not None:
+        raise SettingsError(
+            f"advise={settings.advise!r} needs algorithm {EVOLUTION}, not {name}: leave one of them out"
+        )
     elif settings.imitate is not None and not kind.on_policy:
         raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
 

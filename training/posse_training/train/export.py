@@ -17,7 +17,6 @@ from posse_training.provenance import commit, software
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import LIMIT, Normaliser
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import adviser_of
 
 
 def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
@@ -45,7 +44,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         activation=settings.activation,
         output=algorithm.bound,
     )
-    return LearnedPolicy(network, encoding, card, adviser_of(settings), settings.safeguard)
+    return LearnedPolicy(network, encoding, card, safeguard=settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

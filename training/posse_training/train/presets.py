@@ -14,30 +14,31 @@ Preset = Literal["nothing", "residual"]
 
 
 def default_settings(
-    scenario: str = "smart", algorithm: str = "ppo", *, side: str = "trackers", preset: Preset = "nothing"
+    scenario: str = "smart", algorithm: str | None = None, *, side: str = "trackers", preset: Preset = "nothing"
 ) -> TrainSettings:
     """Return the default settings of a scenario.
 
     Args:
         scenario: A scenario's name, or several separated by commas.
-        algorithm: One of the algorithms.
+        algorithm: One of the algorithms; default: ppo, of the preset ``"residual"`` cmaes.
         side: What learns; a target learns from nothing, whatever the preset.
         preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn a correction of
-            a scripted team, on policy; cmaes always learns that.
+            a scripted team, which cmaes does and no other algorithm.
 
     Raises:
-        SettingsError: An unknown algorithm, or a correction off policy.
+        SettingsError: An unknown algorithm, or a correction by another than cmaes.
     """
-    tables: tuple[str, ...] = "all", algorithm
-    if algorithm != EVOLUTION:
-        tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm, scenario
+    algorithm = algorithm or (EVOLUTION if preset == "residual" else "ppo")
+    learns: str = "residual" if algorithm == EVOLUTION else "nothing"
+    if preset == "residual" and algorithm != EVOLUTION:
+        raise SettingsError(f"preset='residual' goes with cmaes, not {algorithm}: leave one of them out")
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
-    learns: str = "residual" if algorithm == EVOLUTION else preset
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
         learns = "target"
-    elif preset == "residual" and "off-policy" in tables:
-        raise SettingsError(f"preset='residual' goes with ppo or mappo, not {algorithm}: use the preset nothing")
+    tables: tuple[str, ...] = ("all",)
+    if algorithm != EVOLUTION:
+        tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
     for name in ("every", learns):

@@ -91,7 +91,7 @@ class TrainSettings:
 
     # The networks
     encoding: Literal["plain", "slots", "belief"] = "slots"
-    """Network inputs: the observation; with features computed from it; and the adviser's belief."""
+    """Network inputs: the observation; with features computed from it; or of cmaes, and the adviser's belief."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
@@ -134,7 +134,9 @@ class TrainSettings:
     """Gradient steps for each control step of the batch."""
 
     # cmaes; num_worlds is the number that each candidate plays, for whole episodes
-    population: int = number(16, "", 4, 1000)
+    advise: str | None = None
+    """Scripted policy that is corrected: the network reads the velocity that it wants, and adds to it."""
+    population: int = number(32, "", 4, 1000)
     """Candidates in a generation."""
     deviation: float = number(0.02, "", 1e-6, 10)
     """Standard deviation of the weights at the start."""
@@ -144,9 +146,6 @@ class TrainSettings:
     """Policy to begin as a copy of: a name, a file or package.module:Class."""
     imitate_rounds: int = number(8, "", 1, 1000)
     """Rounds of play and fit; the copy acts in a growing share of the worlds."""
-
-    advise: str | None = None
-    """Scripted policy: the network reads the velocity that it wants, and the output corrects it."""
 
     # Evaluation, checkpoints and logs
     evaluate_every: int = number(1_000_000, "", 1, 10**15)
@@ -249,16 +248,11 @@ def _conflicts(s: TrainSettings) -> Iterator[str]:
             "begins"
         )
     if s.encoding == "belief" and s.advise is None:
-        yield "encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned"
-    if s.advise is not None and (s.imitate is not None or s.message_size):
+        yield "encoding='belief' is the belief of an adviser, whom cmaes corrects: use the preset residual"
+    if s.safeguard and s.imitate is not None:
         yield (
-            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as its adviser, which "
-            "sends the messages"
-        )
-    if s.safeguard and (s.advise is not None or s.imitate is not None):
-        yield (
-            "safeguard=True goes with neither advise, whose own safeguard follows the correction, nor imitate, whose "
-            "actions are no wanted velocities: use --no-safeguard"
+            f"safeguard=True does not go with imitate={s.imitate!r}, whose actions are no wanted velocities: use "
+            "--no-safeguard"
         )
     own, other = ("target", "team") if s.side == "target" else ("team", "target")
     if getattr(s, own) is not None:

@@ -16,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
-from posse_training.evolution import evolve
+from posse_training.evolution import adviser_of, evolve, mean_of
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
@@ -28,7 +28,7 @@ from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings
 from posse_training.train.validation import LOAD, first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import adviser_of, make_env, pairings
+from posse_training.train.worlds import make_env, pairings
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -96,12 +96,15 @@ def check_before(settings: TrainSettings) -> None:
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
     check_algorithm(settings)
-    adviser_of(settings)
+    if settings.algorithm == EVOLUTION:
+        adviser_of(settings)
     pairings(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             LOAD[settings.side](policy)
-    if settings.start is not None:
+    if settings.start is not None and settings.algorithm == EVOLUTION:
+        mean_of(Path(settings.start))
+    elif settings.start is not None:
         checkpoint.read_checkpoint(Path(settings.start))
 
 
@@ -119,9 +122,8 @@ class Run(BaseCallback):
         self.settings, self.folder, self.env, self.model, self.display = settings, folder, env, model, display
         self.on_policy = ALGORITHMS[settings.algorithm].on_policy
         self.statistics = RunningStatistics(env.size)
-        # A copy or an adviser may already be better than what a short run makes of it.
-        warm = settings.imitate is not None or settings.advise is not None
-        self.at = Progress(next_evaluation=0 if warm else settings.evaluate_every)
+        # A copy may already be better than what a short run makes of it.
+        self.at = Progress(next_evaluation=settings.evaluate_every if settings.imitate is None else 0)
         self._started = time.monotonic()
 
     def begin(self) -> None:

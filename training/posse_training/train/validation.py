@@ -19,7 +19,6 @@ VALIDATION_SEED: Final = 0
 LOAD: Final[dict[str, Any]] = {"trackers": load, "target": load_target}
 """How a policy of each side is found by name."""
 _WARM_WORLDS: Final = 32
-_WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's proposals
 _HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
 
 
@@ -33,10 +32,9 @@ def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> 
     warm = make_env(replace(settings, num_worlds=few if few >= len(settings.scenarios) else settings.num_worlds))
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
-    reach = 1.0 if settings.advise is None else _WARM_REACH
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
         if step % _HELD == 0:
-            actions = generator.uniform(-reach, reach, (warm.num_envs, warm.action_length)).astype(np.float32)
+            actions = generator.uniform(-1.0, 1.0, (warm.num_envs, warm.action_length)).astype(np.float32)
         statistics.add(np.asarray(warm.step(actions)[0]))
 
 

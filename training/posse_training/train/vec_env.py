@@ -18,9 +18,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
-from posse_baselines import Policy
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
+from posse_baselines.safeguard import Guard
 from posse_training.train.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -40,10 +39,8 @@ class TeamVecEnv(VecEnv):
         batches: Batches of worlds, made with ``autoreset="disabled"`` and equal ``message_size``;
             team sizes may differ.
         encoding: Which inputs are read from an observation.
-        adviser: Policy whose proposals are appended to the observations, and corrected by the
-            actions (2,) (:class:`posse_baselines.safeguard.Advice`).
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
-            (:mod:`posse_baselines.safeguard`); an adviser has one of its own.
+            (:mod:`posse_baselines.safeguard`).
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.train.world_state`).
 
@@ -55,28 +52,19 @@ class TeamVecEnv(VecEnv):
         private_size: How many of them are the tracker's own; the rest is the state.
 
     Raises:
-        ValueError: A batch that resets itself, a target that is an agent, batches whose actions differ in length, or
-            a safeguard behind an adviser.
-        PolicyError: An encoding that does not fit, or a policy that cannot be an adviser.
+        ValueError: A batch that resets itself, a target that is an agent, or batches whose actions differ in length.
+        PolicyError: An encoding that does not fit.
     """
 
     def __init__(
-        self,
-        batches: Sequence[Batch],
-        encoding: Encoding,
-        *,
-        adviser: Policy | None = None,
-        safeguard: bool = False,
-        see_state: bool = False,
+        self, batches: Sequence[Batch], encoding: Encoding, *, safeguard: bool = False, see_state: bool = False
     ) -> None:
-        if adviser and safeguard:
-            raise ValueError("an adviser safeguards by itself: leave out adviser or safeguard")
         self.batches, self.encoding = tuple(batches), encoding
-        self.action_length = MOTION if adviser else _action_length(batches)
+        self.action_length = _action_length(batches)
         scenarios = [batch.scenario for batch in batches]
         states = [StateWriter(batch, scenarios) if see_state else None for batch in batches]
         self._groups = [
-            SlotGroup(batch, encoding, state, adviser, safeguard) for batch, state in zip(batches, states, strict=True)
+            SlotGroup(batch, encoding, state, safeguard) for batch, state in zip(batches, states, strict=True)
         ]
         self._owners = [batch for batch in batches for _ in range(batch.num_worlds * batch.action_shape[1])]
         self.private_size, self.size = self._groups[0].private_size, self._groups[0].size
@@ -187,26 +175,16 @@ def _action_length(batches: Sequence[Batch]) -> int:
 class SlotGroup:
     """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e."""
 
-    def __init__(
-        self,
-        batch: Batch,
-        encoding: Encoding,
-        state: StateWriter | None,
-        adviser: Policy | None = None,
-        safeguard: bool = False,
-    ) -> None:
+    def __init__(self, batch: Batch, encoding: Encoding, state: StateWriter | None, safeguard: bool = False) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         self.num_slots = worlds * trackers
-        self._own_size = encoding.size
-        self.private_size = encoding.size + check_adviser(adviser, believes=encoding.believes)
+        self.private_size = encoding.size
         self.size = self.private_size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         # What makes the robots' actions of the model's.
         self._layer = Guard(batch.layout, worlds) if safeguard else None
-        if adviser:
-            self._layer = Advice(adviser, batch.layout, worlds, believes=encoding.believes)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
         # Rewards of the present episode so far, (E, N).
@@ -254,9 +232,7 @@ class SlotGroup:
         """Return the observations (slots, size) of all slots, or of those of some worlds."""
         seen = raw[worlds]
         out = np.empty((seen.shape[0] * seen.shape[1], self.size), np.float32)
-        self._encoder.encode(seen, out[:, : self._own_size])
-        if self._layer is not None:
-            out[:, self._own_size : self.private_size] = self._layer.inputs[worlds].reshape(len(out), -1)
+        self._encoder.encode(seen, out[:, : self.private_size])
         if self._state is not None:
             self._state.write(out[:, self.private_size :], worlds)
         return out

@@ -11,7 +11,6 @@ import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
-from posse_baselines.safeguard import check_adviser
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings
@@ -70,23 +69,8 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
         layout = ObservationLayout(layout.scenario.replace(message_size=0))
     encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
     return TeamVecEnv(
-        batches,
-        encoding,
-        adviser=adviser_of(settings),
-        safeguard=settings.safeguard,
-        see_state=ALGORITHMS[settings.algorithm].reads_state,
+        batches, encoding, safeguard=settings.safeguard, see_state=ALGORITHMS[settings.algorithm].reads_state
     )
-
-
-def adviser_of(settings: TrainSettings) -> Policy | None:
-    """Return what advises a run's network, if it is advised.
-
-    Raises:
-        PolicyError: A policy that cannot be an adviser.
-    """
-    adviser = None if settings.advise is None else load(settings.advise)
-    check_adviser(adviser, believes=settings.encoding == "belief")
-    return adviser
 
 
 def divided(settings: TrainSettings) -> list[tuple[Pairing, range]]:
