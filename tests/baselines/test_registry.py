@@ -136,19 +136,21 @@ def test_an_unknown_target_is_refused(text: str, message: str) -> None:
         load_target(text)
 
 
-def safe_score(target: str) -> float:
+def results(target: str) -> dict[str, float]:
     team = load("ddcs-tuned")
     moved = load_target(target)
     scenario = posse.get_scenario("duel", target_motion=moved.motion)
     batch = posse.batch(scenario, 40, seed=3, split="test", message_size=team.message_size, target_policy=moved.policy)
-    return float(play(batch, team)["safe_score"].mean())
+    return {name: float(values.mean()) for name, values in play(batch, team).items()}
 
 
 @pytest.mark.long
 def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
-    own = safe_score("smart")
+    own = results("smart")["safe_score"]
     for name in ("constant", *OPEN_LOOP):
-        assert safe_score(name) > own - 0.1, name
+        found = results(name)
+        assert found["safe_score"] > own - 0.1, name
+        assert found["contact_free"] > 0.97, name
 
 
 @pytest.mark.parametrize(("name", "turns"), [("left-circle", 1.0), ("right-circle", -1.0), ("wide-circle", 0.5)])

@@ -112,6 +112,8 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         area_x=_F(min(half_width, _OPEN_AREA)),  # half the width of the rectangle that is to be searched, m
         area_y=_F(min(half_height, _OPEN_AREA)),  # half its height
+        # rad/s, to either side, of a target that is an agent and may turn at any time
+        target_turns=scenario.target_turn_rate if scenario.target_is_agent else 0.0,
         outermost=max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m
     )
 

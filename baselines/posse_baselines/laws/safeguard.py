@@ -51,6 +51,7 @@ DISC: Final = record_type(
     ("velocity", np.complex128),  # m/s
     ("reach", np.float64),  # distance between the centres at contact, m
     ("margin", np.float64),  # clearance, m
+    ("turn", np.float64),  # of its velocity, rad/s
 )
 """An object to avoid, relative to the tracker."""
 
@@ -61,7 +62,7 @@ def put_disc(discs: Records, count: int, place: complex, velocity: complex, reac
     if count >= len(discs):
         return count
     d = discs[count]
-    d.place, d.velocity, d.reach, d.margin = place, velocity, reach, margin
+    d.place, d.velocity, d.reach, d.margin, d.turn = place, velocity, reach, margin, 0.0
     return count + 1
 
 
@@ -92,6 +93,15 @@ def put_walls(discs: Records, count: int, arena: Record, position: complex, radi
 
 
 @compiled
+def moved(disc: Record, time: float) -> complex:
+    """Return by what a disc moves in a time (s), m: along an arc, if its velocity turns."""
+    half = 0.5 * disc.turn * time
+    if abs(half) < 1e-3:
+        return scaled(disc.velocity, time)
+    return scaled(disc.velocity * vector(1.0, half), time * math.sin(half) / half)
+
+
+@compiled
 def cost_of(
     body: Record, discs: Records, speed: float, error: float, wanted: complex, enough: float
 ) -> tuple[float, float]:
@@ -119,7 +129,7 @@ def cost_of(
         weight = _INTRUSION_COST * step / _HORIZON
         for j in range(len(discs)):
             d = discs[j]
-            way, far = d.place + scaled(d.velocity, time) - place, d.reach + d.margin
+            way, far = d.place + moved(d, time) - place, d.reach + d.margin
             square = dot(way, way)
             if square < far * far:
                 gap = math.sqrt(square) - d.reach
@@ -148,6 +158,8 @@ def is_clear(body: Record, discs: Records, wanted: complex) -> bool:
         return False
     for j in range(len(discs)):
         d = discs[j]
+        if d.turn != 0.0:
+            return False
         u = d.velocity - wanted
         closest = clip(-dot(d.place, u) / max(dot(u, u), 1e-9), 0.0, _HORIZON)
         gap = d.place + scaled(u, closest)

@@ -82,6 +82,16 @@ def test_a_resting_robot_gives_way_to_what_comes_at_it(limits: tuple[float, floa
         assert abs(comes + 0.06 - place) > 0.3
 
 
+@pytest.mark.parametrize("turn", [1.5, 0.0, -1.5])
+def test_a_disc_that_turns_is_avoided_where_its_arc_leads(turn: float) -> None:
+    """A quarter of a circle of 0.53 m leads to the robot; straight on it is passed, and more so on the other circle."""
+    disc, radius = np.zeros(1, DISC), 0.8 / 1.5
+    put_disc(disc, 0, complex(-radius, radius), -0.8j, 0.3, 0.15)
+    disc["turn"] = turn
+    _, changed = safe_velocity(body_of(1.0, 0.0, (1.0, 4.0)), disc, 0j)
+    assert changed == (turn > 0.0)
+
+
 @LIMITS
 def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> None:
     body, place, nearest, discs = body_of(0.3, 1.0, limits), 0j, math.inf, np.zeros(4, DISC)
