@@ -10,7 +10,7 @@ from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, killed_at, quiet
 
 from posse_baselines import PolicyError
-from posse_training import league
+from posse_training import evolution, league
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.league import LeagueSettings, draw_matrix, play_league, shares, tables
 from posse_training.train.train import Run
@@ -60,7 +60,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     assert [e.label for e in found.exploited] == ["trackers-2", "target-2"]
     gained = found.exploited[0]
     assert gained.gain == pytest.approx(gained.before["score"].value - gained.after["score"].value), "of a target"
-    for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
+    for owner, name, call in ((Run, "_on_rollout_start", 4), (evolution, "write_json", 1), (league, "evaluate", 9)):
         with killed_at(owner, name, call):
             play_league(tiny(tmp_path / "cut"), console=quiet())
     play_league(tiny(tmp_path / "cut"), console=quiet())

@@ -66,7 +66,7 @@ class LeagueSettings:
     """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
     target_steps: int = number(2_000_000, "", *_STEPS)
     """Steps of each target's training, by ppo."""
-    team_steps: int = number(60_000_000, "", *_STEPS)
+    team_steps: int = number(80_000_000, "", *_STEPS)
     """Steps of each team's training, of one tracker each: evolution of a correction of ddcs-tuned."""
     responses: Literal["last", "all", "none"] = "last"
     """For which generations a best response is trained, which says how much it can be exploited."""
@@ -220,6 +220,7 @@ class League:
             "start": None if start is None else str(start),
             "folder": str(run),
             "evaluate_every": max(1, steps // 4),
+            "evaluate_worlds": 64,
             "checkpoint_every": max(1, steps // 8),
             "tensorboard": False,
             "beside": None,
