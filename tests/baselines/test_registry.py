@@ -37,7 +37,7 @@ def test_a_name_loads_the_policy_that_bears_it(name: str) -> None:
     ("name", "message"),
     [
         ("ddcs-distribute", "did you mean 'ddcs-distributed'"),
-        ("nothing-like-it", "known: random, idle, pursuit"),
+        ("nothing-like-it", f"known: {', '.join(policy_names())}"),
         ("no_such_module:Team", "'no_such_module:Team' cannot be imported.*ModuleNotFoundError"),
         ("posse_baselines.ddcs:DDSC", "unknown name 'DDSC' .did you mean 'DDCS'"),
         ("posse_baselines.ddcs:Settings", "is not a policy: it must have name"),
@@ -134,21 +134,6 @@ def test_wrong_actions_of_a_target_are_named() -> None:
 def test_an_unknown_target_is_refused(text: str, message: str) -> None:
     with pytest.raises(PolicyError, match=message):
         load_target(text)
-
-
-def safe_score(target: str) -> float:
-    team = load("ddcs-tuned")
-    moved = load_target(target)
-    scenario = posse.get_scenario("duel", target_motion=moved.motion)
-    batch = posse.batch(scenario, 40, seed=3, split="test", message_size=team.message_size, target_policy=moved.policy)
-    return float(play(batch, team)["safe_score"].mean())
-
-
-@pytest.mark.long
-def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
-    own = safe_score("smart")
-    for name in ("constant", *OPEN_LOOP):
-        assert safe_score(name) > own - 0.1, name
 
 
 @pytest.mark.parametrize(("name", "turns"), [("left-circle", 1.0), ("right-circle", -1.0), ("wide-circle", 0.5)])

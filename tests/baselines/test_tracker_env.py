@@ -40,7 +40,5 @@ def test_what_cannot_be_played_is_refused(make: Any) -> None:
         make(scenario="constant", number=5)
     with pytest.raises(posse.ScenarioError, match="no team-mates"):
         make(scenario="constant", num_trackers=1)
-    with pytest.raises(posse.ScenarioError, match="not possible in an environment of one agent"):
-        make(scenario="constant", target_motion="agent")
     with pytest.raises(PolicyError, match="unknown policy 'pursiut'"):
         make(scenario="constant", teammates="pursiut")

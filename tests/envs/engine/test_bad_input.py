@@ -42,7 +42,7 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
         ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
-        ("team", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
+        ("team", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env.*target_policy="),
         ("solo vector", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
         ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
         *(

@@ -105,17 +105,11 @@ def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
     assert same(in_another_process(tmp_path, "field", 60), here("field", 60))
 
 
+LONG = (("accelerating", 30), ("constant", 3), ("search", 3), ("radio", 1), ("duel", 1))
+
+
 @pytest.mark.parametrize(
-    ("name", "steps"),
-    [
-        ("field", 30),
-        ("smart", 3),
-        pytest.param("accelerating", 30, marks=pytest.mark.long),
-        pytest.param("constant", 3, marks=pytest.mark.long),
-        pytest.param("search", 3, marks=pytest.mark.long),
-        pytest.param("radio", 1, marks=pytest.mark.long),
-        pytest.param("duel", 1, marks=pytest.mark.long),
-    ],
+    ("name", "steps"), [("field", 30), ("smart", 3), *(pytest.param(*each, marks=pytest.mark.long) for each in LONG)]
 )
 def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:
     """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""
