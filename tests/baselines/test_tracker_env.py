@@ -1,5 +1,6 @@
 """``posse/Tracker-v0``: one tracker is a Gymnasium agent, its team-mates are scripted."""
 
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -30,11 +31,7 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
     assert info["metrics/score"] == pytest.approx(float(infos["metrics/score"][0]))
 
 
-def vector(**settings: Any) -> Any:
-    return gymnasium.make_vec("posse/Tracker-v0", 3, vectorization_mode="vector_entry_point", **settings)
-
-
-@pytest.mark.parametrize("make", [TrackerEnv, vector])
+@pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])
 def test_what_cannot_be_played_is_refused(make: Any) -> None:
     with pytest.raises(ValueError, match="number=5 is not in the team"):
         make(scenario="constant", number=5)

@@ -164,16 +164,6 @@ def test_bad_options_change_nothing(options: dict[str, Any], word: str) -> None:
     assert subject.batch.seed == 9
 
 
-def test_a_robot_starts_outside_obstacles() -> None:
-    batch = posse.batch("obstacles", 1, seed=3)
-    batch.reset()
-    obstacle = batch.arrays.obstacle[0, 0]
-    poses = np.stack([batch.state["tracker_x"][0], batch.state["tracker_y"][0], np.zeros(5)], -1)
-    poses[2, :2] = obstacle["x"], obstacle["y"]
-    with pytest.raises(ValueError, match=r"tracker_2 of world 0 would start in"):
-        batch.reset(seed=3, options={"tracker_pose": poses})
-
-
 def test_a_mask_that_chooses_no_world_starts_none() -> None:
     batch = posse.batch("obstacles", 2, seed=1)
     with pytest.raises(ResetNeeded, match="without reset_mask"):

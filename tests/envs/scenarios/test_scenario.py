@@ -257,12 +257,6 @@ def test_in_leader_loss_the_leader_alone_sees_the_target_from_its_slot() -> None
     assert started("leader-loss").state["tracker_sees"].all()
 
 
-def test_the_paper_is_one_set_up_under_two_names() -> None:
-    centralized, distributed = get_scenario("paper-centralized"), get_scenario("paper-distributed")
-    assert centralized.replace(name="paper-distributed") == distributed
-    assert (centralized.num_trackers, centralized.target_motion) == (5, "constant")
-
-
 def test_the_target_of_robots_is_a_robot_of_the_same_kind() -> None:
     s = get_scenario("robots")
     wheel = s.target_speed + s.target_turn_rate * s.wheel_base / 2
