@@ -178,6 +178,12 @@ def test_a_held_command_takes_the_control_point_where_its_velocity_leads(
     assert place + OFFSET * heading == pytest.approx(OFFSET + dt * complex(ahead, across), abs=1e-9)
 
 
+def test_the_sampled_rate_leaves_what_an_exponential_leaves() -> None:
+    for alpha, dt in ((2.0, 0.1), (0.5, 0.02)):
+        left = 1.0 - dt * formation.sampled_rate(alpha, dt)
+        assert left == pytest.approx(math.exp(-alpha * dt))
+
+
 @PROPERTY
 @given(st.floats(-5.0, 5.0), st.floats(-20.0, 20.0))
 def test_limits_hold_and_reversing_becomes_a_turn(speed: float, omega: float) -> None:
