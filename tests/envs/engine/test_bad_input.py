@@ -51,7 +51,7 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ),
         ("team vector", {"num_envs": 2.5}, rf"num_envs=2\.5 {WHOLE} \[1, "),
     ],
-    ids=str,
+    ids=lambda part: str(part)[:60],
 )
 def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(posse.ScenarioError, match=message):
