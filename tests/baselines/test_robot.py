@@ -72,31 +72,13 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
             forward = 2 * command.speed * SCALE / s.tracker_speeds[i] - 1
             told = forward, command.turn_rate / s.tracker_turn_rates[i], *command.message
             np.testing.assert_allclose(told, actions[0, i], atol=1e-4)
+            said, age = robot.robot.broadcast(), (batch.worlds["step"][0] - t.fix_step) * s.control_step
+            assert (said.number, said.message) == (i, command.message)
+            assert said[1:6] == pytest.approx(motion_of(t))
+            assert (said.fix is None) == (t.fix_step < 0)
+            if said.fix is not None and frame:
+                assert said.fix == pytest.approx(fix_of(t.fix, age), abs=1e-4)
         observations = batch.step(actions)[0]
-
-
-def test_robots_that_hear_each_other_take_their_slots() -> None:
-    """A fleet integrated here, whose robots hear the broadcasts of the step before."""
-    team = load("ddcs-distributed")
-    s = posse.get_scenario("constant", message_size=team.message_size)
-    robots = [deploy(team, Robot(s, i)) for i in range(s.num_trackers)]
-    pose = np.array([(-4.0, 3.0 * i - 6.0, 0.0) for i in range(s.num_trackers)])
-    moving = np.zeros((s.num_trackers, 2))
-    broadcasts: list[Heard] = []
-    for step in range(400):
-        target = TargetFix(0.06 * step, 0.0, 0.0)
-        for i, robot in enumerate(robots):
-            others = [heard._replace(age=s.control_step) for heard in broadcasts if heard.number != i]
-            moving[i] = robot.step(pose[i], *moving[i], target, None, others)[:2]
-        broadcasts = [robot.robot.broadcast() for robot in robots]
-        middle = pose[:, 2] + moving[:, 1] * s.control_step / 2
-        pose[:, 0] += moving[:, 0] * s.control_step * np.cos(middle)
-        pose[:, 1] += moving[:, 0] * s.control_step * np.sin(middle)
-        pose[:, 2] += moving[:, 1] * s.control_step
-    slots = np.array(s.slot_offsets) + np.array((0.06 * 400, 0.0))
-    gaps = np.linalg.norm(pose[:, None, :2] - slots, axis=2)
-    assert sorted(gaps.argmin(axis=1)) == list(range(s.num_trackers))
-    assert gaps.min(axis=1).max() < 0.1
 
 
 def test_invalid_measurements_are_refused() -> None:

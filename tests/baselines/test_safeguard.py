@@ -32,15 +32,22 @@ def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
     assert np.median(gone) < 0.2, "nothing of the script's guidance moves it"
 
 
-def full_speed(safe: bool) -> tuple[float, float]:
-    """Drive at full speed towards the common middle; return the share of worlds with contact, and the way, m."""
-    near: dict[str, Any] = {"num_trackers": 4, "start_distance": (2.0, 3.0), "horizon": 100, "settle_time": 1.0}
-    batch = posse.batch("constant", 20, seed=1, autoreset="disabled", **near)
+LIMITED: dict[str, Any] = {"tracker_acceleration": 1.0, "tracker_turn_acceleration": 4.0}
+CROSSING: dict[str, Any] = {"scenario": "constant", "num_trackers": 4, "start_distance": (2.0, 3.0)}
+FAR_WALL: dict[str, Any] = {"scenario": "obstacles", "num_trackers": 3, "arena": 14.0, "num_obstacles": 3}
+
+
+def full_speed(settings: dict[str, Any], safe: bool) -> tuple[float, float]:
+    """Drive at full speed to the other side of the team's middle, or among obstacles along the x-axis to the wall.
+
+    Return the share of worlds with contact, and the way, m.
+    """
+    batch = posse.batch(num_worlds=20, seed=1, autoreset="disabled", horizon=100, **settings)
     observations, guard, s, way = batch.reset(), Guard(batch.layout, 20), batch.scenario, 0.0
-    middle = points(batch, "tracker").mean(axis=1, keepdims=True)
+    opposite = 2 * points(batch, "tracker").mean(axis=1, keepdims=True) - points(batch, "tracker")
     for _ in range(100):
-        wanted = (middle - points(batch, "tracker")) / directions(batch, "tracker")
-        wanted /= np.maximum(np.abs(wanted), 1e-6)
+        wanted = np.ones((20, s.num_trackers)) if s.walled else opposite - points(batch, "tracker")
+        wanted = wanted / np.maximum(np.abs(wanted), 1e-6) / directions(batch, "tracker")
         guard.follow(observations)
         actions = guard.actions(np.stack([wanted.real, wanted.imag], axis=-1).astype(np.float32))
         if not safe:
@@ -51,11 +58,26 @@ def full_speed(safe: bool) -> tuple[float, float]:
     return float((batch.metrics()["contact_free"] == 0).mean()), way
 
 
-def test_it_keeps_robots_apart_that_want_the_same_place() -> None:
-    (bare, far), (safe, way) = full_speed(False), full_speed(True)
+@pytest.mark.parametrize(
+    "settings", [CROSSING, CROSSING | LIMITED, FAR_WALL | LIMITED | {"tracker_acceleration": 0.25}]
+)
+def test_it_keeps_robots_from_each_other_obstacles_and_walls(settings: dict[str, Any]) -> None:
+    (bare, far), (safe, way) = full_speed(settings, False), full_speed(settings, True)
     assert bare == 1.0
     assert safe <= 0.1
     assert way > 0.2 * far
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, 2.0, 3.0])
+def test_a_resting_robot_gives_way_to_what_comes_at_it(heading: float) -> None:
+    batch = posse.batch("constant", 1, num_trackers=1, **LIMITED)
+    options = {"tracker_pose": [[0.0, 0.0, heading]], "target_pose": [-4.0, 0.0, 0.0]}
+    observations, guard = batch.reset(options=options), Guard(batch.layout, 1)
+    for _ in range(100):
+        guard.follow(observations)
+        observations, *_ = batch.step(guard.actions(np.zeros(batch.action_shape, np.float32)))
+    assert batch.state["world_x"][0] > 1.5
+    assert batch.metrics()["contact_free"][0] == 1.0
 
 
 def test_it_foresees_commands_that_act_late() -> None:

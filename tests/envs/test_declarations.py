@@ -19,17 +19,13 @@ SENSOR = (
 MISTAKES: Final = {
     # What is declared.
     "posse.reward_term('1')(int)": "reward term <class 'int'>: declare a function, made by def, not a type",
-    "posse.reward_term('1')(functools.partial(print))": r"functools.partial\(.*: declare a function.*not a partial",
     "posse.target_motion('own')(lambda c, w: None)": r"<lambda> \(main.py:1\): its docstring.* is missing",
     "@posse.reward_term\ndef own(c, w, t):\n    return 1": r'own \(main.py:1\): the decorator needs arguments: .*"1"',
     '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
-    '@posse.reward_term("1")\ndef own(c, w, t):\n    return 1': r"own \(main.py:1\): its docstring.* is missing",
     '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
-    '@posse.target_motion("agent")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): the name 'agent' is taken",
     '@posse.target_motion("a b")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): invalid name 'a b'",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
     TERM.format("c, *w", "return 1"): r"its parameters are \(c, \*w\), not",
-    MOTION.format("", ", team", "pass"): r"its parameters are \(c, w, team\), not \(c, w\) or \(c, w, trackers\) or",
     # Names of what is declared.
     FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
     TERM.format("c, w, t", "return 1").replace('{"own"', '{"wn"'): r"unknown reward term 'wn' \(did you mean 'own'",
@@ -38,10 +34,8 @@ MISTAKES: Final = {
     **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
        for size in ("0", "2.0", "1000000000", "True")},
     FIELD.format('"1", 0, 1, "no"', "c, v", "v.x"): r"unknown='no' is not a number between low=0 and high=1",
-    FIELD.format('"1", 0, 1, float("nan")', "c, v", "v.x"): r"unknown=nan is not a number between",
     FIELD.format('"1", 0, 1, 2', "c, v", "v.x"): r"unknown=2 is not a number between low=0 and high=1 in 'constant'",
     FIELD.format('"1", 1, 2', "c, v, m", "m.age"): r"unknown=0.0 is not a number between low=1 and high=2",
-    FIELD.format('"1", 0, float("inf")', "c, v", "v.x"): r"high=inf in 'constant' is not a finite number",
     FIELD.format('"1", 0, lambda s: s.arena', "c, v", "v.x"): r"high=inf in 'constant' is not a finite number",
     FIELD.format('"1", 0, lambda s: s.sped', "c, v", "v.x"): r"high in 'constant': .*no attribute 'sped'",
     FIELD.format('"1", 1, 0', "c, v", "v.x"): r"low=1 is above high=0",
@@ -49,36 +43,30 @@ MISTAKES: Final = {
     MOTION.format(", memory=3", "", "pass"): r"memory=3 must be a list of posse.Memory",
     MOTION.format(', memory=[posse.Memory("if", "1", 0, 1, "?")]', "", "pass"): r"invalid name 'if' of a memory",
     MOTION.format(', memory=[posse.Memory("speed", "1", 0, 1, "?")]', "", "pass"): r"a world has a field 'speed'",
-    MOTION.format(', memory=[posse.Memory("m", "1", 0, float("inf"), "?")]', "", "pass"): r"high=inf of memory 'm'",
     MOTION.format(', memory=[posse.Memory("m", "1", 0, lambda s: s.arena, "?")]', "", "pass"): r"high=inf of memory",
-    MOTION.format(', draw=print', "", "pass"): r"built-in function print>: declare a function, made by def",
     METRIC.format('"m", per="second"'): r"metric own \(main.py:1\): unknown per='second'; allowed: step, tracker_step",
-    METRIC.format('"m", per=["step"]'): r"unknown per=\['step'\]; allowed",
     SENSOR.format("c", '"own", fix="range"'): r"sensor own \(main.py:3\): unknown fix='range'; allowed: pos",
     SENSOR.format("c", '"own", measure=m'): r"sensor m \(main.py:1\): its parameters are \(c\), not \(c, w, number, dx",
     # What the compiler says.
     TERM.format("c, w, t", "return t.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did",
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did you mean",
-    MOTION.format("", "", "w.goal_cos = w.sped"): r"own \(main.py:1\): line 4: there is no field 'sped'",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"line 4: .*to float32",
     MOTION.format("", "", 'w.goal_cos = float(open("x").read())'): r"line 4: Untyped global name 'open'",
     TERM.format("c, w, t", "return [t.x][0]"): r"line 4: it creates an array, a list or a text",
-    TERM.format("c, w, t", "return np.zeros(3)[0]"): r"line 4: zeros\(",
-    TERM.format("c, w, t", 'return "north"'): r"line 1: it returns .*, not a number",
     TERM.format("c, w, t", "return t.x, t.y"): r"line 1: it returns .*, not a number",
     FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"line 1: it returns Lanes, not 2 numbers",
     FIELD.format('"1", 0, 1', "c, v", "np.linalg.eigvals(v.x)"): r"line 4: eigvals\(Lanes\): no such function",
 }  # fmt: skip
 
 ATTEMPTS = """
-import functools, json, sys
+import json
 import numpy as np
 import posse
 
 messages = []
 for code in json.loads(open("mistakes.json").read()):
     try:
-        exec(compile(code, "main.py", "exec"), {"__name__": "main", "posse": posse, "np": np, "functools": functools})
+        exec(compile(code, "main.py", "exec"), {"__name__": "main", "posse": posse, "np": np})
         messages.append("nothing")
     except Exception as error:
         messages.append(f"{type(error).__name__}: {error}")

@@ -1,6 +1,5 @@
 """The checkers of other libraries find every registered scenario sound, and variants with other settings."""
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -17,10 +16,6 @@ from torchrl.envs.utils import check_env_specs
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # it imports PettingZoo by names of older releases
-    import supersuit
-
 Settings = dict[str, Any]
 VARIANTS: dict[str, Settings] = {
     **{name: {"scenario": name} for name in posse.scenario_names()},
@@ -30,9 +25,6 @@ VARIANTS: dict[str, Settings] = {
     "the target an agent": {"scenario": "smart", "target_motion": "agent"},
 }
 KEYS = {"score", *(f"reward/{t.name}" for t in posse.REWARD_TERMS), *(f"metrics/{m.name}" for m in posse.METRICS)}
-PLAIN = "black_death_v3 clip_reward_v0 flatten_v0 nan_random_v0 nan_zeros_v0 normalize_obs_v0 pad_observations_v0"
-WITH_ARGUMENTS: dict[str, Any] = {"delay_observations_v0": 2, "frame_skip_v0": (1, 3), "frame_stack_v2": 3}
-WRAPPERS = {**dict.fromkeys(PLAIN.split()), **WITH_ARGUMENTS, "max_observation_v0": 2, "sticky_actions_v0": 0.3}
 
 
 def parallel(settings: Settings) -> Any:
@@ -70,30 +62,11 @@ def spaces_and_infos(settings: Settings) -> None:
         assert np.isfinite(list(rewards.values())).all()
 
 
-def wrapped_by_supersuit(settings: Settings) -> None:
-    wrapped = {n: getattr(supersuit, n)(parallel(settings), *([] if v is None else [v])) for n, v in WRAPPERS.items()}
-    wrapped["agent_indicator_v0"] = supersuit.agent_indicator_v0(supersuit.normalize_obs_v0(parallel(settings)))
-    for name, env in wrapped.items():
-        seen, _ = env.reset(seed=1)
-        seen, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-        assert all(env.observation_space(agent).contains(row) for agent, row in seen.items()), name
-    many = supersuit.concat_vec_envs_v1(supersuit.pettingzoo_env_to_vec_env_v1(parallel(settings)), 2, num_cpus=1)
-    many.reset(seed=1)
-    actions = np.stack([many.action_space.sample() for _ in range(many.num_envs)])
-    assert many.step(actions)[0].shape == (many.num_envs, *many.observation_space.shape)
-
-
 def wrapped_by_torchrl(settings: Settings) -> None:
     check_env_specs(PettingZooWrapper(parallel(settings), return_state=True))
 
 
-CHECKS: tuple[Callable[[Settings], None], ...] = (
-    all_at_once,
-    in_turns,
-    spaces_and_infos,
-    wrapped_by_supersuit,
-    wrapped_by_torchrl,
-)
+CHECKS: tuple[Callable[[Settings], None], ...] = (all_at_once, in_turns, spaces_and_infos, wrapped_by_torchrl)
 
 
 @pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL", "ignore:Environment's m:UserWarning")
@@ -137,20 +110,3 @@ def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
     assert [info["working"].sum(axis=1).tolist() for info in infos] == [[5] * 3] * 2 + [[4] * 3] * 2
     with pytest.raises(ValueError, match="read-only"):
         infos[0]["metrics/duration"][0] = 1.0
-    for name in ("Team", "Tracker"):
-        env = gymnasium.make_vec(f"posse/{name}-v0", 3, **settings)
-        first = env.reset(seed=1)[1]
-        told = [env.step(np.zeros(env.action_space.shape or (), np.float32))[-1] for _ in range(4)]
-        last = told[-1]["final_info"] if autoreset == "same_step" else told[-1]
-        assert first.keys() == last.keys() == KEYS | {"working"} | {f"_{key}" for key in (*KEYS, "working")}
-        assert last["metrics/duration"] == pytest.approx(0.4)
-
-
-@pytest.mark.long
-def test_torchrl_starts_processes_of_its_own() -> None:
-    envs = GymEnv("posse:posse/Team-v0", num_envs=2, scenario="smart", horizon=4)
-    check_env_specs(envs)
-    rollout = envs.rollout(6, break_when_any_done=False)
-    assert rollout["next", "reward/slot"].shape[:2] == (2, 6)
-    assert rollout["next", "done"].sum() == 2
-    envs.close()

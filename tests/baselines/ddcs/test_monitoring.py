@@ -87,7 +87,6 @@ def test_the_belief_of_a_team_in_formation_is_correct() -> None:
     ddcs.propose(observations, memory)
     belief = beliefs(memory, observations)
     at, own, target = points(batch, "tracker"), directions(batch, "tracker"), points(batch, "world")[:, None]
-    assert belief.shape == (8, 5)
     assert (belief["known"] == 1.0).all()
     np.testing.assert_allclose(way(belief["target"], 3.0), (target - at) / own, rtol=0, atol=0.02)
     moving = batch.scenario.target_speed * directions(batch, "world")[:, None] / own

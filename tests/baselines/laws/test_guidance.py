@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tests.support.reference.motion import on_arc
 
@@ -24,16 +24,6 @@ def short_way(angle: float) -> float:
 
 
 # --- geometry of a pair --------------------------------------------------------------------------
-
-
-@PROPERTY
-@given(st.floats(-100.0, 100.0))
-@example(math.pi)
-@example(-math.pi)
-def test_wrap_keeps_the_direction(angle: float) -> None:
-    wrapped = wrap(angle)
-    assert -math.pi < wrapped <= math.pi
-    assert cmath.exp(1j * wrapped) == pytest.approx(cmath.exp(1j * angle), abs=1e-12)
 
 
 def test_line_of_sight_points_from_tracker_to_target() -> None:
@@ -145,18 +135,6 @@ def test_regulation_turns_the_short_way_and_never_reverses(
     assert ahead == pytest.approx(np.clip(speed * math.cos(error), 0.0, 1.0), abs=1e-9)
     held = np.clip(error / 0.1, -2.0, 2.0) + rate
     assert omega == pytest.approx(np.clip(held, -2.0, 2.0), abs=1e-9)
-
-
-@PROPERTY
-@given(ANGLES, ANGLES, st.floats(-1.5, 1.5))
-def test_a_turning_heading_is_reached_and_then_kept(theta: float, wanted: float, rate: float) -> None:
-    for _ in range(120):
-        v = cmath.rect(0.5, wanted)
-        _, omega = regulate(body_of(theta), v, rate)
-        theta, wanted = theta + 0.1 * omega, wanted + 0.1 * rate
-    assert short_way(wanted - theta) == pytest.approx(0.0, abs=1e-6)
-    v = cmath.rect(0.5, wanted)
-    assert regulate(body_of(theta), v, rate)[1] == pytest.approx(rate, abs=1e-5)
 
 
 def test_a_zero_velocity_keeps_the_heading() -> None:

@@ -5,24 +5,23 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.learned import network_for, observations_of, policy_for
+from tests.support.learned import observations_of, policy_for
 from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
 from posse_baselines.learned import Encoder, Encoding, Network
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
-from posse_baselines.policy import PolicyError
 
 
 def test_names_are_those_of_views() -> None:
     batch, observations = observations_of("radio")
-    encoding = Encoding.of(batch.layout, neighbours=3)
-    views, columns = batch.layout.views(observations), encoding.columns(batch.layout)[0]
-    for name, column in zip(encoding.names(), columns, strict=True):
+    encoding = Encoding.of(batch.layout, neighbours=3)  # of five: the nearest
+    views, rows = batch.layout.views(observations), Encoder(encoding, batch.layout).encode(observations)
+    for name, column in zip(encoding.names(), rows.T, strict=True):
         field, _, at = name.rstrip("]").partition("[")
         index = tuple(int(i) for i in at.split(", ") if i)
-        np.testing.assert_array_equal(views[field][(..., *index)], observations[..., column])
+        np.testing.assert_array_equal(views[field][(..., *index)].ravel(), column)
 
 
 def test_longer_messages_than_it_uses_change_nothing() -> None:
@@ -42,13 +41,6 @@ def test_places_that_a_small_team_lacks_are_unknown() -> None:
     np.testing.assert_array_equal(named["neighbour_range"][:, 1:], -1)
     np.testing.assert_array_equal(named["neighbour_bearing"][:, 1:], 0)
     assert (named["neighbour_range"][:, 0] > 0).all()
-
-
-def test_fewer_places_keep_the_nearest() -> None:
-    batch = posse.batch("smart", 2)
-    observations = batch.reset()
-    rows = Encoder(Encoding.of(batch.layout, neighbours=2), batch.layout).encode(observations)
-    np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
 
 
 def test_own_slot_is_where_the_state_says() -> None:
@@ -115,12 +107,3 @@ def test_actions_are_the_networks_output(kind: str, activation: str, output: str
     np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(actions).max() <= 1
     assert np.ptp(actions) > 0.5  # the networks say something
-
-
-def test_a_network_names_the_layer_that_does_not_follow() -> None:
-    first, second, bias = (np.zeros(shape, np.float32) for shape in ((4, 3), (2, 5), (4,)))
-    biases = bias, bias[:2]
-    with pytest.raises(PolicyError, match="as many biases as weights"):
-        network_for(3, weights=(first,), biases=biases)
-    with pytest.raises(PolicyError, match=r"layers.1.weight has shape \(2, 5\), not \(2, 4\)"):
-        network_for(3, weights=(first, second), biases=biases)

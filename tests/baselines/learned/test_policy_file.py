@@ -1,7 +1,6 @@
 """Policy files give back the policy; other and damaged ones are refused by name, and reading one runs no code."""
 
 import json
-import pickle
 import sys
 import tempfile
 from pathlib import Path
@@ -9,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 from tests.support.learned import any_policy, observations_of
 
 from posse_baselines import Policy, PolicyError, load
@@ -85,7 +84,9 @@ def read(content: bytes) -> Policy | None:
 
 @PROPERTY
 @given(st.binary(max_size=300))
-def test_random_bytes_are_refused(content: bytes) -> None:
+@example(b"cos\nsystem\n(S'true'\ntR.")  # a pickle that runs a command
+@example(save({"a": np.zeros(3)}))
+def test_other_bytes_are_refused_and_not_run(content: bytes) -> None:
     assert read(content) is None
     assert read(len(content).to_bytes(8, "little") + content) is None  # as the header of safetensors begins
 
@@ -98,29 +99,6 @@ def test_a_damaged_file_is_refused_or_plays_the_same(whole: bytes, where: float,
     policy = read(bytes(flipped))
     assert policy is None or np.array_equal(actions_of(policy), actions_of(POLICY))
     assert kept == 1 or read(whole[: int(kept * len(whole))]) is None
-
-
-class _Planted:
-    """Makes a file when it is unpickled."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Path.touch, (self._file,)
-
-
-def test_other_files_are_refused_and_not_run(tmp_path: Path) -> None:
-    path = tmp_path / "other.safetensors"
-    with pytest.raises(PolicyError, match="there is no policy file"):
-        LearnedPolicy.from_file(path)
-    save_file({"a": np.zeros(3)}, path)
-    with pytest.raises(PolicyError, match="holds no policy"):
-        LearnedPolicy.from_file(path)
-    path.write_bytes(pickle.dumps(_Planted(tmp_path / "it_ran")))
-    with pytest.raises(PolicyError, match="not a policy file"):
-        LearnedPolicy.from_file(path)
-    assert list(tmp_path.iterdir()) == [path]
 
 
 MANY = {"kind": "plain", "neighbours": 10**9, "fields": []}
@@ -168,18 +146,20 @@ def test_descriptions_that_lack_something_or_are_of_another_kind(tmp_path: Path,
 
 
 @pytest.mark.parametrize(
-    ("name", "array"),
+    ("name", "array", "message"),
     [
-        ("normaliser.mean", np.zeros((3, 3), np.float32)),
-        ("normaliser.scale", np.zeros(0, np.float32)),
-        ("layers.0.weight", TENSORS["layers.0.weight"].astype(np.float64)),
-        ("layers.2.bias", np.full_like(TENSORS["layers.2.bias"], np.nan)),
-        ("layers.2.weight", TENSORS["layers.2.weight"][:1]),
-        ("layers.7.weight", TENSORS["layers.2.weight"]),
+        ("normaliser.mean", np.zeros((3, 3), np.float32), "normaliser.mean has shape"),
+        ("normaliser.scale", np.zeros(0, np.float32), "normaliser.scale has shape"),
+        ("layers.0.weight", TENSORS["layers.0.weight"].astype(np.float64), "finite float32"),
+        ("layers.2.bias", np.full_like(TENSORS["layers.2.bias"], np.nan), "finite float32"),
+        ("layers.2.weight", TENSORS["layers.2.weight"][:1], r"layers.2.weight has shape \(1, 16\), not \(2, 16\)"),
+        ("layers.7.weight", TENSORS["layers.2.weight"], ""),
     ],
 )
-def test_arrays_that_make_no_network(tmp_path: Path, described: dict[str, Any], name: str, array: Any) -> None:
+def test_arrays_that_make_no_network(
+    tmp_path: Path, described: dict[str, Any], name: str, array: Any, message: str
+) -> None:
     path = tmp_path / "forged.safetensors"
     write_policy_file(path, {**TENSORS, name: array}, described)
-    with pytest.raises(PolicyError, match=r"forged\.safetensors"):
+    with pytest.raises(PolicyError, match=rf"forged\.safetensors.*{message}"):
         LearnedPolicy.from_file(path)

@@ -9,7 +9,7 @@ import pytest
 from scripts.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_target_check, replay
 
 import posse
-from posse_baselines import PolicyError, load, load_target, policy_names
+from posse_baselines import load_target, policy_names
 from posse_baselines.learned import Encoder, LearnedPolicy
 from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS, shipped
 from posse_training import evaluate
@@ -30,9 +30,6 @@ def test_every_file_is_known_by_its_name() -> None:
     assert sorted(shipped()) == [path.stem for path in TEAMS]
     assert sorted(shipped(SHIPPED_TARGETS)) == [path.stem for path in TARGETS]
     assert set(shipped()) <= set(policy_names())
-    with pytest.raises(PolicyError, match="unknown policy 'learned-nothing'") as caught:
-        load("learned-nothing")
-    assert all(name in str(caught.value) for name in shipped())
 
 
 @pytest.mark.parametrize("path", [*TEAMS, *TARGETS], ids=lambda path: path.stem)

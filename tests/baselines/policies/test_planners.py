@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import posse
 from posse_baselines import PolicyError, batch_for, begin, load, play, rollout
@@ -14,17 +13,13 @@ from posse_baselines.policies.planner import Planner, PlannerSettings
 QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
 """Looks ahead for a shorter time than it should."""
 QUICK_BELIEF = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=0)
-NEAR = (1.5, 4.0)
 
 
-def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.float32]:
-    """Return the actions (steps, E, N, 2 + m) of so many steps."""
-    return rollout(batch, planner, ["actions"], steps=steps)["actions"]
-
-
-def test_what_is_kept_must_have_been_played_ahead() -> None:
+def test_impossible_settings_are_refused() -> None:
     with pytest.raises(ValueError, match=r"keep=5\.0 must be at most look_ahead=4\.0"):
         PlannerSettings(keep=5.0)
+    with pytest.raises(ValueError, match=r"look_ahead=0.0 must lie in \[0.1, 20\]"):
+        PlannerSettings(look_ahead=0.0)
 
 
 @pytest.mark.long
@@ -39,7 +34,7 @@ def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
         ("planner", "ddcs-distributed", "smart", 6, {"horizon": 300}),
         ("planner", "ddcs-distributed", "robots", 6, {"horizon": 300}),
         pytest.param("planner", "ddcs-distributed", "obstacles", 6, {"horizon": 300}, marks=pytest.mark.long),
-        ("belief-planner", "ddcs-tuned", "smart", 4, {"horizon": 160, "start_distance": NEAR}),
+        ("belief-planner", "ddcs-tuned", "smart", 4, {"horizon": 160, "start_distance": (1.5, 4.0)}),
     ],
 )
 def test_playing_ahead_is_worth_more_than_the_script(
@@ -63,8 +58,8 @@ def test_worlds_whose_episodes_begin_at_different_steps_are_played_as_alone() ->
             memory = planner.restart(memory, mask)
         actions, memory = planner.act(observations, memory)
         observations = batch.step(actions)[0]
-    other = actions_of(Planner(QUICK), posse.batch("smart", 1, seed=1, first_world=1), 23)
-    np.testing.assert_array_equal(actions[1:], other[-1])
+    alone = rollout(posse.batch("smart", 1, seed=1, first_world=1), Planner(QUICK), ["actions"], steps=23)
+    np.testing.assert_array_equal(actions[1:], alone["actions"][-1])
 
 
 def test_it_does_not_know_the_faults_to_come() -> None:
@@ -102,18 +97,14 @@ def test_the_planner_reads_only_the_batch_it_watches() -> None:
 # --- the belief planner --------------------------------------------------------------------------
 
 
-def for_beliefs(scenario: str, worlds: int, **settings: Any) -> posse.Batch:
-    return posse.batch(scenario, worlds, message_size=load("belief-planner").message_size, **settings)
-
-
 def test_what_it_cannot_sense_changes_nothing() -> None:
     """Of two teams one is in sight of the target in part; where it is from the others, what it plans and the faults
     to come differ."""
     played: list[list[Any]] = [[], []]
     for hidden, actions in enumerate(played):
-        batch = for_beliefs("field", 4, seed=3, start_distance=(9.0, 20.0))
-        policy, observations = BeliefPlanner(QUICK_BELIEF), batch.reset()
-        memory, world = begin(policy, batch), batch.arrays.world
+        policy = BeliefPlanner(QUICK_BELIEF)
+        batch = posse.batch("field", 4, seed=3, start_distance=(9.0, 20.0), message_size=policy.message_size)
+        observations, memory, world = batch.reset(), begin(policy, batch), batch.arrays.world
         if hidden:
             world["x"] += 0.5 * np.sign(world["x"])
             world["heading_cos"], world["heading_sin"] = world["heading_sin"], world["heading_cos"].copy()
@@ -130,9 +121,10 @@ def test_what_it_cannot_sense_changes_nothing() -> None:
 @pytest.mark.parametrize("motion", ["constant", "smart"])
 def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     """What a tracker is told is 0.3 s old; of a constant target it knows the present pose, of a smart one nearly so."""
-    late = {"sensing_range": 4.0, "radio_range": 9.0, "radio_delay": 3, "start_distance": (2.0, 6.0)}
-    batch = for_beliefs("smart", 8, seed=2, target_motion=motion, **late)
-    played = rollout(batch, BeliefPlanner(QUICK_BELIEF), ["observations", "annotations", "target_pose"], steps=40)
+    policy = BeliefPlanner(QUICK_BELIEF)
+    late: dict[str, Any] = {"sensing_range": 4.0, "radio_range": 9.0, "radio_delay": 3, "start_distance": (2.0, 6.0)}
+    batch = posse.batch("smart", 8, seed=2, target_motion=motion, message_size=policy.message_size, **late)
+    played = rollout(batch, policy, ["observations", "annotations", "target_pose"], steps=40)
     away = played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]
     only_told = batch.layout.views(played["observations"][:-1])["target_age"] > 0.25
     assert only_told.sum() > 50
@@ -140,8 +132,3 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     assert np.median(wrong) < 0.01
     if motion == "constant":
         assert wrong.max() < 1e-3
-
-
-def test_settings_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"look_ahead=0.0 must lie in \[0.1, 20\]"):
-        PlannerSettings(look_ahead=0.0)

@@ -67,29 +67,3 @@ def test_the_registry_makes_both_kinds() -> None:
     assert isinstance(parallel, TeamParallelEnv)
     assert len(parallel.possible_agents) == 3
     assert isinstance(pettingzoo.make("aec", "posse/track-v0", horizon=5), pettingzoo.AECEnv)
-
-
-def test_turns_move_the_world_when_all_have_acted() -> None:
-    parallel, turns = posse.parallel_env("smart"), posse.env("smart")
-    parallel.reset(seed=0)
-    turns.reset(seed=0)
-    rng = np.random.default_rng(0)
-    for _ in range(10):
-        before = turns.state()
-        actions = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in parallel.agents}
-        for agent in parallel.agents:
-            assert np.array_equal(turns.state(), before)
-            assert turns.agent_selection == agent
-            turns.step(actions[agent])
-        parallel.step(actions)
-        assert np.array_equal(turns.state(), parallel.state())
-
-
-def test_turns_check_all_actions_when_the_last_has_acted() -> None:
-    env = posse.env(num_trackers=2)
-    env.reset(seed=0)
-    before = env.state()
-    env.step(f32([2, 0]))
-    with pytest.raises(ValueError, match=r"tracker_0: speed = 2\.0 .*clip_actions=True"):
-        env.step(f32([1, 0]))
-    assert np.array_equal(env.state(), before)

@@ -8,9 +8,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from tests.support.adapters import play_both
 
-import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
-from posse import ScenarioError
 from posse.adapters.vector_env import TeamVectorEnv
 
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
@@ -69,19 +67,3 @@ def test_every_world_is_drawn() -> None:
     assert not np.array_equal(first, second)
     env.close()
     env.close()
-
-
-@pytest.mark.parametrize("scenario", ["smart", "family-open"])
-@pytest.mark.parametrize(
-    ("name", "value"), [("num_envs", 0), ("num_envs", 2.5), ("num_envs", True), ("seed", -1), ("seed", "x")]
-)
-def test_wrong_numbers_are_refused_by_name(scenario: str, name: str, value: Any) -> None:
-    with pytest.raises(ScenarioError, match=rf"{name}={value!r} (must|is refused: it must) be a whole number"):
-        vector(scenario=scenario, **{name: value})
-
-
-@pytest.mark.parametrize("scenario", ["leader-loss", posse.family("leader-loss", target_speed=(0.3, 0.4))])
-def test_a_team_of_one_is_refused_where_trackers_break(scenario: str | posse.Family) -> None:
-    with pytest.raises(ScenarioError, match=r"breaks=1 of the trackers .* Pass breaks=0, or use posse/Team-v0"):
-        vector("posse/Solo-v0", scenario=scenario)
-    vector("posse/Solo-v0", scenario=scenario, breaks=0).close()

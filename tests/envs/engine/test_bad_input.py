@@ -42,12 +42,16 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
         ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
-        ("team", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
+        ("team", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env.*target_policy="),
         ("solo vector", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
         ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
-        ("solo vector", {"scenario": "leader-loss"}, "breaks=1"),
+        *(
+            ("solo vector", {"scenario": each}, r"breaks=1 of the trackers .* Pass breaks=0, or use posse/Team-v0")
+            for each in ("leader-loss", posse.family("leader-loss", target_speed=(0.3, 0.4)))
+        ),
+        ("team vector", {"num_envs": 2.5}, rf"num_envs=2\.5 {WHOLE} \[1, "),
     ],
-    ids=str,
+    ids=lambda part: str(part)[:60],
 )
 def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(posse.ScenarioError, match=message):
@@ -158,16 +162,6 @@ def test_bad_options_change_nothing(options: dict[str, Any], word: str) -> None:
     subject.env.reset()
     assert re.search(word, subject.refused(lambda: subject.env.reset(seed=1, options=options)))
     assert subject.batch.seed == 9
-
-
-def test_a_robot_starts_outside_obstacles() -> None:
-    batch = posse.batch("obstacles", 1, seed=3)
-    batch.reset()
-    obstacle = batch.arrays.obstacle[0, 0]
-    poses = np.stack([batch.state["tracker_x"][0], batch.state["tracker_y"][0], np.zeros(5)], -1)
-    poses[2, :2] = obstacle["x"], obstacle["y"]
-    with pytest.raises(ValueError, match=r"tracker_2 of world 0 would start in"):
-        batch.reset(seed=3, options={"tracker_pose": poses})
 
 
 def test_a_mask_that_chooses_no_world_starts_none() -> None:

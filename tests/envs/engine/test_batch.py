@@ -1,6 +1,5 @@
 """The batch: determinism, replays, resets, saving, copies, and returned arrays that never change."""
 
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +47,7 @@ def test_seed_split_and_episode_each_make_other_worlds() -> None:
 
 
 @pytest.mark.parametrize("name", ["smart", "leader-loss", "field", "robots"])
-def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
+def test_a_batch_is_saved_and_restored_in_mid_episode(name: str) -> None:
     batch = posse.batch(name, 3, seed=6, message_size=1)
     batch.reset()
     for step in range(25):
@@ -57,12 +56,9 @@ def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
     def onward(batch: posse.Batch) -> list[npt.NDArray[Any]]:
         return [batch.step(actions_for(batch, step))[0] for step in range(25, 60)]
 
-    saved, copies = batch.save(), (pickle.loads(pickle.dumps(batch)), out_of_band(batch))  # noqa: S301
-    kept, expected = pickle.loads(pickle.dumps(saved)), onward(batch)  # noqa: S301
-    for copy in copies:
-        assert same(onward(copy), expected)
+    saved, expected = batch.save(), onward(batch)
     fresh = posse.batch(name, 3, message_size=1)
-    for into, back in ((batch, saved), (batch, kept), (batch, out_of_band(saved)), (fresh, saved)):
+    for into, back in ((batch, saved), (batch, out_of_band(saved)), (fresh, saved)):
         np.testing.assert_array_equal(into.restore(back), now)
         assert same(onward(into), expected)
     for other in (posse.batch(name, 2, message_size=1), posse.batch(name, 3)):
@@ -109,17 +105,11 @@ def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
     assert same(in_another_process(tmp_path, "field", 60), here("field", 60))
 
 
+LONG = (("accelerating", 30), ("constant", 3), ("search", 3), ("radio", 1), ("duel", 1))
+
+
 @pytest.mark.parametrize(
-    ("name", "steps"),
-    [
-        ("field", 30),
-        ("smart", 3),
-        pytest.param("accelerating", 30, marks=pytest.mark.long),
-        pytest.param("constant", 3, marks=pytest.mark.long),
-        pytest.param("search", 3, marks=pytest.mark.long),
-        pytest.param("radio", 1, marks=pytest.mark.long),
-        pytest.param("duel", 1, marks=pytest.mark.long),
-    ],
+    ("name", "steps"), [("field", 30), ("smart", 3), *(pytest.param(*each, marks=pytest.mark.long) for each in LONG)]
 )
 def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:
     """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""

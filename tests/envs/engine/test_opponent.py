@@ -156,8 +156,6 @@ def test_an_object_that_is_no_target_policy_is_refused() -> None:
         posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
-    with pytest.raises(posse.ScenarioError, match="target_policy="):
-        gym.make("posse/Team-v0", scenario=SHORT, target_motion="agent")
 
 
 def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:

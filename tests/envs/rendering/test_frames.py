@@ -66,25 +66,18 @@ def test_equal_states_give_equal_frames_also_where_some_are_left_out() -> None:
     np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(Renderer(batch.scenario, size=SIZE), batch))
 
 
-def test_robots_slots_and_headings_are_drawn_where_they_are() -> None:
+def test_robots_and_slots_are_drawn_where_they_are() -> None:
     batch = posse.batch("constant", 1, num_trackers=2)
     poses = [(5, 0, 1.57), (-1.2, 0, 0)]  # the second in the wedge's first slot, 1.2 m behind the target
     batch.reset(options={"tracker_pose": poses, "target_pose": (0, 0, 0)})
     renderer = Renderer(batch.scenario, size=(900, 800))
     frame = renderer.draw(batch, colours=[TRACKER, (0, 0, 255)])
     assert frame is not None
-    assert_colour(renderer, frame, (5.07, -0.07), TRACKER)  # beside the line of the heading
+    assert_colour(renderer, frame, (5.07, -0.07), TRACKER)
     assert_colour(renderer, frame, (-1.22, 0.06), (0, 0, 255))
     assert_colour(renderer, frame, (-0.05, 0.05), TARGET)
     assert_colour(renderer, frame, (-1.2, 0.225), SLOT_FILLED)
     assert_colour(renderer, frame, (2, 1), GROUND)
-    ahead, beside = (
-        frame[tuple(renderer.camera.project(at).round().astype(int)[::-1])].sum() for at in ((5, 0.2), (5.2, 0))
-    )
-    assert ahead < beside, "the line of the heading is darker than the ground"
-    (right, _), (centre, low), (_, above) = renderer.camera.project([(1, 0), (0, 0), (0, 1)])
-    assert right > centre
-    assert above < low
 
 
 def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:

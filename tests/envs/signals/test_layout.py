@@ -22,12 +22,10 @@ def test_what_the_target_agent_is_given() -> None:
             world = one_world(state, e)
             mine = {name: view[e, 4] for name, view in views.items()}
             p, h = positions(world), headings(world)
-            assert mine["number"] == -1
-            assert mine["target_known"] == 0
-            assert mine["target_age"] == mine["target_range"] == -1
+            assert mine["number"] == mine["target_age"] == mine["target_range"] == -1
+            assert mine["target_known"] == mine["acceleration_time"] == 0, "an agent's limits act at once"
             assert mine["max_speed"] == np.float32(s.target_speed)
             assert mine["max_turn_rate"] == np.float32(s.target_turn_rate)
-            assert mine["acceleration_time"] == 0, "an agent's limits act at once"
             np.testing.assert_allclose(mine["sonar"], sonar(s, world, 4), rtol=1e-4, atol=2e-3)
             away = (p[:4] - p[4]) / h[4]
             at = mine["neighbour_bearing"][:4] @ [1, 1j] * mine["neighbour_range"][:4]
@@ -35,8 +33,7 @@ def test_what_the_target_agent_is_given() -> None:
             assert sorted(order) == [0, 1, 2, 3]
             np.testing.assert_allclose(at, away[order], rtol=1e-4, atol=1e-4)
             assert (np.diff(mine["neighbour_range"][:4]) >= 0).all(), "nearest first"
-            assert mine["neighbour_number"][4:].tolist() == [-1, -1]
-            assert mine["neighbour_range"][4:].tolist() == [-1, -1]
+            assert (mine["neighbour_number"][4:] == -1).all()
             assert (mine["neighbour_heading"][4:] == 0).all()
         observations = batch.step(rng.uniform(-1, 1, batch.action_shape))[0]
 
@@ -48,17 +45,6 @@ def test_the_target_agent_feels_a_wall() -> None:
         observations = batch.step([[[-1.0, 0.0], [1.0, 0.0]]])[0]
     assert batch.state["world_x"][0] == pytest.approx(4.85, abs=1e-3)
     assert batch.layout.views(observations)["touching"][0].tolist() == [0.0, 1.0]
-
-
-@pytest.mark.parametrize("name", posse.scenario_names())
-def test_views_share_memory_and_cover_the_observation(name: str) -> None:
-    batch = posse.batch(name, 2, message_size=2)
-    layout, observations = batch.layout, batch.reset(seed=7)
-    views = layout.views(observations)
-    assert all(np.shares_memory(view, observations) for view in views.values())
-    marks = np.arange(observations.size, dtype=np.float32).reshape(observations.shape)
-    covered = np.concatenate([view.ravel() for view in layout.views(marks).values()])
-    np.testing.assert_array_equal(np.sort(covered), marks.ravel())
 
 
 WORLDS: dict[str, dict[str, Any]] = {
