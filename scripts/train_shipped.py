@@ -17,16 +17,11 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-CORRECTIONS: Final = {
-    "corrected-smart": "ppo",
-    "corrected-radio": "ppo",
-    "corrected-leader-loss": "cmaes",
-    "corrected-obstacles": "cmaes",
-    "corrected-field": "mappo",
-    "corrected-search": "cmaes",
-    "learned-robots": "cmaes",
-}
-"""Teams that correct the script on the scenario of their name, and how they are trained."""
+CORRECTIONS: Final = (
+    *("corrected-smart", "corrected-radio", "corrected-leader-loss", "corrected-obstacles", "corrected-field"),
+    *("corrected-search", "learned-robots"),
+)
+"""Teams that correct the script on the scenario of their name."""
 FROM_NOTHING: Final = ("smart", "radio")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SEEDS: Final = {"smart": 5, "field": 5}
@@ -59,10 +54,10 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             )
     runs = []
     for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
-        for team, algorithm in CORRECTIONS.items():
+        for team in CORRECTIONS:
             name = scenario_of(team)
             if name in settings.scenario and (settings.seed or seed <= SEEDS.get(name, 3)):
-                corrects = default_settings(name, algorithm, preset="residual")
+                corrects = default_settings(name, preset="residual")
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"{team}-{seed}"))
         for name in FROM_NOTHING:
             if name in settings.scenario and (settings.seed or seed <= 3):
