@@ -41,7 +41,7 @@ Cell = dict[str, Estimate]
 """What a team scores against a target, by these names; the last one is the share of episodes without contact."""
 TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
-"""Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
+"""Seed and number of the validation worlds by which opponents are weighed."""
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
 _FREE: Final = ("generations", "responses", "longer", "episodes")
 """Settings that the command that resumes a league may change."""
@@ -57,9 +57,6 @@ class LeagueSettings:
     """Scenario of all plays."""
     generations: int = number(8, "", 1, 10_000)
     """Generations in all: in each a target is trained, then a team."""
-    opponents: Literal["pfsp", "fictitious"] = "pfsp"
-    """How the worlds are divided among the other side's past. fictitious: evenly; pfsp: an opponent
-    that is harder for the present policy gets more."""
     teams: Annotated[tuple[str, ...], tyro.conf.arg(name="team")] = ("ddcs-tuned",)
     """Teams at the beginning: names or files."""
     targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
@@ -166,15 +163,13 @@ class League:
 
     def _generation(self, side: str, generation: int) -> None:
         """Train the member of a side, against the other's past and present."""
-        s = self.settings
         *own, trained = self._members(side, generation)
         if trained.trained:
             return
         others = self._members(TEAM if side == TARGET else TARGET, generation - (side == TARGET))
-        hard = dict.fromkeys((other.policy for other in others), 0.0)
-        if s.opponents == "pfsp" and len(others) > 1:
-            hard = {other.policy: self._difficulty(side, own[-1], other) for other in others}
-        opponents = ",".join(name for name, part in shares(hard).items() for _ in range(part))
+        # Prioritised fictitious self-play: harder ones get more of the worlds.
+        parts = shares({other.policy: self._difficulty(side, own[-1], other) for other in others})
+        opponents = ",".join(name for name, part in parts.items() for _ in range(part))
         self._train(side, trained, opponents, 1, own)
 
     def _exploit(self, side: str, of: list[Member], others: list[Member]) -> None:
