@@ -64,10 +64,10 @@ def test_the_state_changes_values_but_no_actions(tmp_path: Path) -> None:
     rows = torch.from_numpy(env.reset()).requires_grad_()
     policy.get_distribution(rows).distribution.mean.sum().backward()
     gradient: Any = rows.grad
-    assert not gradient[:, env.private_size :].any()
-    assert gradient[:, : env.private_size].any()
+    assert not gradient[:, env.encoding.size :].any()
+    assert gradient[:, : env.encoding.size].any()
     other = rows.detach().clone()
-    other[:, env.private_size :] += 5.0
+    other[:, env.encoding.size :] += 5.0
     with torch.no_grad():
         assert (policy.predict_values(rows) - policy.predict_values(other)).abs().max() > 1e-4
 
@@ -97,7 +97,7 @@ def test_imitation_copies(tmp_path: Path) -> None:
     env = make_env(settings)
     model = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []
-    statistics = RunningStatistics(env.private_size)
+    statistics = RunningStatistics(env.encoding.size)
     imitate(model, settings, env.encoding, _Circle(), statistics, lambda line: errors.append(float(line.split()[-1])))
     assert len(errors) == 4
     assert errors[-1] < 0.02

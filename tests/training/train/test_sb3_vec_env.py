@@ -142,7 +142,7 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     for step in range(HORIZON):
         observations, _, dones, infos = move(env, np.zeros((10, 2), np.float32))
         assert dones.all() == (step == HORIZON - 1)
-    time_left = env.private_size + 5
+    time_left = env.encoding.size + 5
     assert observations[:, time_left] == pytest.approx(HORIZON * 0.1)
     finals = np.stack([info["terminal_observation"] for info in infos])
     assert finals[:, time_left] == pytest.approx(0)
@@ -151,9 +151,9 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     for i in (0, 3):
         dx, dy = t["x"][0, i] - w["x"][0], t["y"][0, i] - w["y"][0]
         ahead = dx * w["frame_cos"][0] + dy * w["frame_sin"][0]
-        assert observations[5 + i, env.private_size + 6] == pytest.approx(ahead, rel=1e-5)
+        assert observations[5 + i, env.encoding.size + 6] == pytest.approx(ahead, rel=1e-5)
         other = observations[5 + (i + 4) % 5]
-        assert other[env.private_size + 6 + 11] == pytest.approx(ahead, rel=1e-5)
+        assert other[env.encoding.size + 6 + 11] == pytest.approx(ahead, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def _ppo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 def _mappo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     from posse_training.train.networks import CentralizedCriticPolicy
 
-    return _any_ppo(s, env, CentralizedCriticPolicy, private_size=env.private_size)
+    return _any_ppo(s, env, CentralizedCriticPolicy, private_size=env.encoding.size)
 
 
 def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, **network: Any) -> BaseAlgorithm:

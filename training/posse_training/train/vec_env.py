@@ -48,8 +48,7 @@ class TeamVecEnv(VecEnv):
         batches: The batches, in the order of their slots.
         encoding: As given.
         action_length: Numbers of an action, 2 + m.
-        size: Numbers of an observation.
-        private_size: How many of them are the tracker's own; the rest is the state.
+        size: Numbers of an observation; behind the encoding's is the state.
 
     Raises:
         ValueError: A batch that resets itself, a target that is an agent, or batches whose actions differ in length.
@@ -67,7 +66,7 @@ class TeamVecEnv(VecEnv):
             SlotGroup(batch, encoding, state, safeguard) for batch, state in zip(batches, states, strict=True)
         ]
         self._owners = [batch for batch in batches for _ in range(batch.num_worlds * batch.action_shape[1])]
-        self.private_size, self.size = self._groups[0].private_size, self._groups[0].size
+        self.size = self._groups[0].size
         self._terms: dict[str, list[float]] = {}  # sum over slots and steps, and of how many
         super().__init__(
             len(self._owners),
@@ -179,8 +178,7 @@ class SlotGroup:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         self.num_slots = worlds * trackers
-        self.private_size = encoding.size
-        self.size = self.private_size + (state.size if state else 0)
+        self.size = encoding.size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         # What makes the robots' actions of the model's.
@@ -232,9 +230,10 @@ class SlotGroup:
         """Return the observations (slots, size) of all slots, or of those of some worlds."""
         seen = raw[worlds]
         out = np.empty((seen.shape[0] * seen.shape[1], self.size), np.float32)
-        self._encoder.encode(seen, out[:, : self.private_size])
+        own = self._encoder.encoding.size
+        self._encoder.encode(seen, out[:, :own])
         if self._state is not None:
-            self._state.write(out[:, self.private_size :], worlds)
+            self._state.write(out[:, own:], worlds)
         return out
 
     def _report(
