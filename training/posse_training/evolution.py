@@ -52,8 +52,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     require("training", "cmaes")
     from cmaes import CMA
 
-    s = settings
-    basis = _basis(_encoding(s))
+    s, basis = settings, _basis(Encoding(settings.encoding, 0, ()))
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0, "mean": []}
     if (folder / STATE).is_file():
@@ -63,24 +62,22 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.note(f"resuming {folder} at generation {len(state['scores'])}")
     scores, curve, started = state["scores"], state["curve"], time.monotonic() - state["seconds"]
 
-    def policy(card: dict[str, Any]) -> LearnedPolicy:
-        """Return the correction at the mean of the search."""
-        return Candidates(s, np.tensordot(cma.mean.astype(np.float32), basis, 1)[None], card)
+    def team(points: list[npt.NDArray[np.float64]], card: dict[str, Any] | None = None) -> Candidates:
+        return Candidates(s, np.tensordot(np.array(points, np.float32), basis, 1), card or {})
 
     def play(points: list[npt.NDArray[np.float64]]) -> list[float]:
         """Return the mean safe score of each candidate on the worlds of the present generation."""
-        team = Candidates(s, np.tensordot(np.array(points, np.float32), basis, 1), {})
-        return team.scores(len(scores) * s.num_worlds, num_threads)
+        return team(points).scores(len(scores) * s.num_worlds, num_threads)
 
     def evaluate(steps: int) -> None:
         """Score the mean of the search on the validation worlds; keep it if it is the best so far."""
         point = {"steps": float(steps), "seconds": time.monotonic() - started}
-        point |= validate(s, policy({}))
+        point |= validate(s, team([cma.mean]))
         best = max((earlier["safe_score"] for earlier in curve), default=-1.0)
         curve.append(point)
         write_curve(folder / CURVE, curve)
         if point["safe_score"] > best:
-            policy(make_card(s, steps=steps, curve=curve)).save(folder / BEST)
+            team([cma.mean], make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
     mean = np.zeros(len(basis)) if s.start is None else mean_of(Path(s.start))
@@ -101,7 +98,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
             evaluate(steps)
         state |= {"seconds": time.monotonic() - started, "mean": cma.mean.tolist()}
         write_json(folder / STATE, state, indent=None)
-    policy(make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
+    team([cma.mean], make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
 
 
@@ -128,10 +125,6 @@ def mean_of(folder: Path) -> npt.NDArray[np.float64]:
         return np.array(read_json(folder / STATE)["mean"], np.float64)
 
 
-def _encoding(s: TrainSettings) -> Encoding:
-    return Encoding(s.encoding, 0, ())
-
-
 class Candidates(LearnedPolicy):
     """C corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
 
@@ -145,7 +138,7 @@ class Candidates(LearnedPolicy):
         self._settings, self._weights = settings, weights
         zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
         network = Network(zeros, ones, LIMIT, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
-        super().__init__(network, _encoding(settings), card, adviser_of(settings))
+        super().__init__(network, Encoding(settings.encoding, 0, ()), card, adviser_of(settings))
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         if len(self._weights) == 1:
