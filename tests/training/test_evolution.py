@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
-from tests.support.runs import BELIEVING, TARGET, killed_at, quiet, resume, small
+from tests.support.runs import BELIEVING, killed_at, quiet, resume, small
 
 import posse
 from posse_baselines import begin, load
 from posse_training import evolution
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.evaluation import evaluate
 from posse_training.train import default_settings
 from posse_training.train.train import train
@@ -77,14 +77,3 @@ def test_its_defaults_correct_the_tuned_script() -> None:
     found = default_settings("robots", "cmaes")
     assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
     assert found == default_settings("robots", "cmaes", preset="residual")
-
-
-def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
-    for changes, message in (
-        ({}, "corrects a script: set advise"),
-        ({**EVOLVED, "start": "runs/a"}, "start='runs/a' needs"),
-        (TARGET, "corrects no script: use ppo"),
-    ):
-        with pytest.raises(SettingsError, match=message):
-            train(small(tmp_path / "run", "cmaes", **changes), console=quiet())
-        assert not (tmp_path / "run").exists()

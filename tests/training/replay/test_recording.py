@@ -143,19 +143,6 @@ def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
         join([one] * 5)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"seconds": float("nan")}, "seconds=nan must be above 0"),
-        ({"world": -1}, "first_world=-1 must be"),
-        ({"target_motion": "agent"}, "the target of 'smart' is an agent"),
-    ],
-)
-def test_what_cannot_be_recorded_is_named(wrong: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        record(**({"policies": ["idle"], "scenario": "smart"} | wrong))
-
-
 def test_contacts_are_told_with_who_touched_what() -> None:
     """Two trackers run into each other, part, and one runs into the target."""
     batch = posse.batch("constant", 1, num_trackers=2, target_motion="agent", horizon=80)

@@ -10,7 +10,7 @@ from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.train import TrainSettings
 from posse_training.train.train import train
 from posse_training.train.validation import validate
@@ -57,30 +57,6 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
     assert before == after
     with pytest.raises(RunFolderError, match=r"(?s)do not fit this run.*hidden"):
         train(replace(second, folder=tmp_path / "third", hidden=(8,)), console=quiet())
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"team": None}, "set team"),
-        ({"encoding": "slots"}, "encoding='slots'"),
-        ({"message_size": 2}, "message_size=2"),
-        ({"side": "neither"}, "side='neither'"),
-        ({"overrides": {"target_motion": "agent"}}, "the setting target"),
-        ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "unknown term of a target 'slot'"),
-        ({"algorithm": "mappo"}, "mappo"),
-        ({"team": "nobody"}, "unknown policy 'nobody'"),
-        ({"team": "planner"}, "cannot be trained against"),
-        ({"beside": "evadr"}, "unknown target 'evadr'"),
-        ({"side": "trackers", "team": None, "target": "idle", "reward_weights": {}}, "unknown target 'idle'"),
-    ],
-)
-def test_what_fits_no_target_is_refused_before_anything_is_made(
-    changes: dict[str, Any], message: str, tmp_path: Path
-) -> None:
-    with pytest.raises((PolicyError, SettingsError, posse.ScenarioError), match=message):
-        train(target_run(tmp_path / "run", **changes), console=quiet())
-    assert not (tmp_path / "run").exists()
 
 
 def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
