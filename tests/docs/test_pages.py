@@ -111,19 +111,6 @@ def test_teams_are_ranked_by_the_safe_score(
     assert listed[2][2:] == ["0.550&nbsp;[0.400,&nbsp;0.600]", "75.0%", "1,000", "7", "`932670c`"]
 
 
-def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(
-    hook: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hostile = "![p](https://x.invalid/p){: onerror=alert(1) }"
-    path, standings = tmp_path / "standings.csv", hook("standings")
-    text = standings_text([dataclasses.replace(ROW, label="LABEL")])
-    path.write_text(text.replace("LABEL", hostile), encoding="utf-8")
-    monkeypatch.setattr(standings, "STANDINGS", path)
-    for made in (standings.leaderboard, standings.results):
-        with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be at most 100 letters"):
-            made()
-
-
 def test_every_replay_is_in_the_gallery(hook: Callable[[str], ModuleType]) -> None:
     replays = hook("replays")
     made = "".join(replays.scenario(name) for name in re.findall(r"\{\{ scenario (\S+) \}\}", SCENARIOS))

@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 import tyro
 from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
-from scripts.tune_shipped import repeat_all
 from tests.support.runs import TARGET, quiet, small
-from tests.support.tunable import small as small_tuning
 
 from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
@@ -19,7 +17,6 @@ from posse_training import evaluate
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.train import train
-from posse_training.tune import tune
 
 SETTINGS = small(Path(), steps=640, team_sizes=(2, 3), hidden=(8,), evaluate_every=320, evaluate_worlds=2)
 
@@ -117,14 +114,3 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
     assert str(tmp_path) not in str(card)
     assert card["comparison"]["cost"]["count"] == 4
     assert card["check"]["score"] >= 0
-
-
-def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse_baselines.tuned.SHIPPED_TUNED", tmp_path / "shipped")
-    settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
-    card = json.loads(tune(settings, console=quiet()).read_text())
-    shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
-    shipped.parent.mkdir(parents=True)
-    shipped.write_text(json.dumps({**card, "settings": {}}))
-    (result,) = repeat_all(tmp_path / "again", quiet())
-    assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card

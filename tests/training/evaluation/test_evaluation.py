@@ -19,13 +19,6 @@ from posse_training.evaluation.statistics import difference, improvement, mean, 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
 
-def test_an_episode_scores_the_same_however_many_are_played() -> None:
-    few = evaluate("pursuit", "smart", 3, seed=5, **FAST)
-    many = evaluate("pursuit", "smart", 20, seed=5, **FAST)
-    for name, column in few.columns.items():
-        np.testing.assert_array_equal(column, many[name][:3])
-
-
 def test_it_plays_the_worlds_of_a_batch() -> None:
     scenario = posse.get_scenario("constant", horizon=80)
     results = evaluate("pursuit", scenario, 4, seed=3, progress=False)

@@ -94,23 +94,6 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
         assert player.metrics[name] == pytest.approx(float(value[0]), nan_ok=True)
 
 
-def test_the_world_is_described() -> None:
-    world = short().world
-    assert (world["seed"], world["split"], world["world"]) == (3, "test", 1)
-    field = posse.get_scenario("field")
-    assert (world["settings"]["name"], world["settings"]["version"]) == ("field", field.version)
-    assert world["changed"] == {"num_trackers": [5, 4]}
-    batch = posse.batch("field", 1, seed=3, split="test", first_world=1, num_trackers=4)
-    batch.reset()
-    state = batch.state
-    obstacles = np.stack([state[f"obstacle_{k}"][0] for k in ("x", "y", "radius")], -1)
-    np.testing.assert_array_equal(np.array(world["obstacles"], np.float32), obstacles)
-    # Both players' fields: the message of a team-mate is only in the first one's observation.
-    names = [field["name"] for field in world["fields"]]
-    assert set(names) == {field.name for field in batch.layout.fields} | {"neighbour_message"}
-    assert [p.name for p in short().players] == ["ddcs-distributed", "pursuit"]
-
-
 def driven(batch: posse.Batch, steps: int) -> Trajectory:
     recorder = Recorder(batch, RECORD)
     recorder.reset()
