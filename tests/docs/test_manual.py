@@ -8,10 +8,8 @@ import importlib
 import os
 import re
 import threading
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
 
 import pytest
 from tests.support.browser import chromium
@@ -66,12 +64,6 @@ def test_every_setting_is_in_the_manual(site: Path) -> None:
     assert [word for word in wanted if word not in text] == []
 
 
-def test_the_repository_has_one_address() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert f"repo_url: {project['urls']['Repository']} " in settings
-
-
 # --- in a browser ---------------------------------------------------------------------------------
 
 
@@ -101,13 +93,10 @@ def address(site: Path) -> Iterator[str]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
-def test_pages_fit_are_short_and_ask_no_other_host(
-    site: Path, address: str, width: int, screen: int, scheme: Literal["light", "dark"]
-) -> None:
+def test_pages_fit_are_short_and_ask_no_other_host(site: Path, address: str, width: int, screen: int) -> None:
     with chromium() as browser:
-        page = browser.new_page(viewport={"width": width, "height": screen}, color_scheme=scheme)
+        page = browser.new_page(viewport={"width": width, "height": screen})
         asked: list[str] = []
         failed: list[str] = []
         page.on("request", lambda request: asked.append(request.url))

@@ -41,18 +41,11 @@ def chromium() -> Iterator[Browser]:
 
 @contextmanager
 def opened(
-    browser: Browser,
-    path: Path,
-    address: str = "",
-    *,
-    size: tuple[int, int] = (1200, 800),
-    dark: bool = False,
-    still: bool = False,
+    browser: Browser, path: Path, address: str = "", *, size: tuple[int, int] = (1200, 800), still: bool = False
 ) -> Iterator[Page]:
     """Open a file; fail if it makes a request or writes to the console. ``still``: the user wants no motion."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
-        color_scheme="dark" if dark else "light",
         reduced_motion="reduce" if still else "no-preference",
         device_scale_factor=1,
     )

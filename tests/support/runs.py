@@ -17,6 +17,7 @@ from posse_training.train.checkpoint import read_checkpoint
 from posse_training.train.train import train
 
 HORIZON = 40
+SHORT: dict[str, Any] = {"horizon": HORIZON, "settle_time": 1.0}
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:
@@ -29,7 +30,7 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
         folder=folder,
         num_worlds=4,
         team_sizes=(2,),
-        overrides={"horizon": HORIZON, "settle_time": 1.0},
+        overrides=SHORT,
         hidden=(16, 16),
         minibatch=64,
         rollout=20,
@@ -101,19 +102,10 @@ def killed_at(owner: Any, name: str, call: int) -> Iterator[None]:
             yield
 
 
-ADVISED: dict[str, Any] = {
-    "scenario": "field",
-    "advise": "ddcs-distributed",
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
-}
+ADVISED: dict[str, Any] = {"scenario": "field", "advise": "ddcs-distributed", "overrides": SHORT}
 BELIEVING: dict[str, Any] = {**ADVISED, "advise": "ddcs-tuned", "encoding": "belief", "end_on_contact": True}
 """With the settings of a correction: adviser, belief, a contact ends an episode."""
-GUARDED: dict[str, Any] = {
-    "scenario": "smart",
-    "safeguard": True,
-    "end_on_contact": True,
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
-}
+GUARDED: dict[str, Any] = {"scenario": "smart", "safeguard": True, "end_on_contact": True, "overrides": SHORT}
 """From nothing, behind the safeguard."""
 TARGET: dict[str, Any] = {
     "scenario": "smart",
@@ -124,7 +116,7 @@ TARGET: dict[str, Any] = {
     "steps": 640,
     "evaluate_every": 320,
     "checkpoint_every": 160,
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+    "overrides": {**SHORT, "num_trackers": 3},
     "reward_weights": {"team": -1.0, "contact": -0.5},
 }
 """Of a target against two teams."""
@@ -133,6 +125,6 @@ AGAINST: dict[str, Any] = {
     "team": None,
     "target": "smart,evader",
     "team_sizes": (),
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+    "overrides": {**SHORT, "num_trackers": 3},
 }
 """Of a team against two targets, of which one is learned."""

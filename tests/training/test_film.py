@@ -11,7 +11,6 @@ from PIL import Image
 from posse.rendering.style import TARGET
 from posse_baselines import load
 from posse_training.film import film
-from posse_training.replay.page import PLAYERS
 
 Frames = npt.NDArray[np.uint8]
 PURSUIT, IDLE = ("one", load("pursuit")), ("two", load("idle"))
@@ -38,9 +37,6 @@ def test_panels_stand_side_by_side_on_the_same_world(tmp_path: Path) -> None:
     np.testing.assert_array_equal(first, third)
     np.testing.assert_array_equal(first[0], second[0])
     assert (first[-1] != second[-1]).any()
-    assert np.abs(frames[0, 1, [100, 300, 500]].astype(int) - PLAYERS[:3]).max() <= 4  # each team's colour above it
-    target = np.abs(frames.astype(int) - TARGET).max(axis=-1) <= 4  # a flat colour is kept, however small its area
-    assert (target.sum(axis=(1, 2)) > 20).all()
 
 
 def test_frames_may_be_left_out_and_a_film_may_begin_later(tmp_path: Path) -> None:

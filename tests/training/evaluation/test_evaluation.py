@@ -13,7 +13,6 @@ import posse
 from posse_baselines import BasePolicy, load, play
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
-from posse_training.evaluation import statistics
 from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
@@ -129,17 +128,6 @@ class TestTrainingSeeds:
     def test_improvement_compares_every_pair_of_seeds(self) -> None:
         mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])
         assert improvement(mine, theirs).value == pytest.approx((1 + 0 + 1 + 0.5 + 4 * 0.25) / 8)
-
-    @pytest.mark.long
-    def test_the_truth_is_in_as_often_as_is_said(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(statistics, "RESAMPLES", 300)
-        rng = np.random.default_rng(9)
-        for seeds, least, most in ((3, 0.72, 0.88), (10, 0.86, 0.97)):
-            inside = 0
-            for _ in range(150):
-                estimate = over_seeds(self.draw(rng, seeds, 20, 1.0, 0.0))
-                inside += estimate.low <= 0 <= estimate.high
-            assert least <= inside / 150 <= most
 
     def test_worlds_that_do_not_match_are_refused(self) -> None:
         with pytest.raises(ValueError, match="same worlds"):

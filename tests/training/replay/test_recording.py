@@ -14,7 +14,7 @@ import posse
 from posse_baselines import Recorder, Trajectory, begin, load
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
-from posse_training.replay import RECORD, Player, Replay, join, record, replay_of
+from posse_training.replay import RECORD, Player, Replay, record, replay_of
 from posse_training.replay.columns import find_events
 from posse_training.replay.format import decode, encode, resolution_of
 
@@ -106,24 +106,12 @@ def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
     many = replay_of(driven(posse.batch("radio", 5, seed=2), 30).episode(3), "a")
     alone = replay_of(driven(posse.batch("radio", 1, seed=2, first_world=3), 30), "a")
     assert many.world == alone.world
+    assert [many.world[name] for name in ("seed", "split", "world", "episode")] == [2, "train", 3, 0]
     one, other = many.players[0], alone.players[0]
     assert list(one.columns) == list(other.columns)
     for name, values in one.columns.items():
         np.testing.assert_array_equal(values, other.columns[name])
     assert one.events == other.events
-
-
-def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
-    one, two = record(["idle"], "smart", seconds=1), record(["pursuit"], "smart", seconds=1)
-    joined = join([one, two])
-    assert [player.name for player in joined.players] == ["idle", "pursuit"]
-    talker = record(["ddcs-distributed"], "smart", seconds=1)
-    assert len(join([one, talker]).players) == 2  # the length of messages does not count
-    other = record(["pursuit"], "smart", seconds=1, world=1, tolerance=0.2)
-    with pytest.raises(SettingsError, match="same world: tolerance, world differ"):
-        join([one, other])
-    with pytest.raises(SettingsError, match="1 to 4 players, got 5"):
-        join([one] * 5)
 
 
 def test_contacts_are_told_with_who_touched_what() -> None:

@@ -30,7 +30,6 @@ def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
         load(whole)
     scenario = posse.get_scenario("smart", horizon=HORIZON, num_trackers=3, settle_time=1.0)
     assert evaluate("ddcs-distributed", scenario, 2, target=target, progress=False).episodes == 2
-    assert any(name.startswith("/checkpoint/worlds/0.opponent.") for name in numbers(tmp_path / "whole"))
 
 
 def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
@@ -65,9 +64,4 @@ def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
     assert [batch.num_worlds for batch in env.batches] == [6, 3]
     assert [batch.first_world for batch in env.batches] == [0, 6]
     assert env.num_envs == 9, "one slot for each target"
-    assert env.action_length == 2
-    weights = dict(env.batches[0].scenario.target_reward_weights)
-    assert weights == {"team": -1.0, "contact": -0.5}
-    observations = env.reset()
-    assert observations.shape == (9, env.encoding.size)
-    assert not any(f.name == "neighbour_message" for f in env.encoding.fields)
+    assert env.reset().shape == (9, env.encoding.size)
