@@ -65,12 +65,6 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
     printed("page.py", cwd=tmp_path, seconds=900, BROWSER="true")
 
 
-@pytest.mark.parametrize("part", NOT_RUN)
-def test_every_block_that_is_not_run_has_a_reason(part: str) -> None:
-    assert any(part in text for page in FOLLOWED for _, _, text in blocks(page)), "no page has it: remove it"
-    pytest.skip(f"{part}: {NOT_RUN[part]}")
-
-
 @functools.cache
 def help_of(command: str) -> str:
     if command not in COMMANDS:

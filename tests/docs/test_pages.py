@@ -5,13 +5,11 @@ import importlib
 import json
 import re
 import runpy
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import matplotlib as mpl
 import pytest
 from tests.support.process import ROOT, printed
 
@@ -71,16 +69,12 @@ ROW = Standing("a team", "a.b:C", False, "smart", 1, 2026, 1000, 0.5, 0.4, 0.6, 
 
 
 @pytest.fixture
-def hook(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], ModuleType]]:
+def hook(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     """Import a module of the manual's."""
     pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
-    before = set(sys.modules)
     for folder in ("drawing", "hooks"):
         monkeypatch.syspath_prepend(str(DOCS / folder))
-    yield importlib.import_module
-    for name in set(sys.modules) - before:
-        if str(DOCS) in str(getattr(sys.modules[name], "__file__", "")):
-            del sys.modules[name]
+    return importlib.import_module
 
 
 def test_the_table_of_the_readme_is_made_from_the_result_files(hook: Callable[[str], ModuleType]) -> None:
@@ -111,32 +105,8 @@ def test_teams_are_ranked_by_the_safe_score(
     assert listed[2][2:] == ["0.550&nbsp;[0.400,&nbsp;0.600]", "75.0%", "1,000", "7", "`932670c`"]
 
 
-def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(
-    hook: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hostile = "![p](https://x.invalid/p){: onerror=alert(1) }"
-    path, standings = tmp_path / "standings.csv", hook("standings")
-    text = standings_text([dataclasses.replace(ROW, label="LABEL")])
-    path.write_text(text.replace("LABEL", hostile), encoding="utf-8")
-    monkeypatch.setattr(standings, "STANDINGS", path)
-    for made in (standings.leaderboard, standings.results):
-        with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be at most 100 letters"):
-            made()
-
-
 def test_every_replay_is_in_the_gallery(hook: Callable[[str], ModuleType]) -> None:
     replays = hook("replays")
     made = "".join(replays.scenario(name) for name in re.findall(r"\{\{ scenario (\S+) \}\}", SCENARIOS))
     assert len(replays.REPLAYS) <= 8
     assert set(re.findall(r"media/replays/(\S+)\.html", made)) == set(replays.REPLAYS)
-
-
-def test_each_law_has_an_equation_and_a_picture(hook: Callable[[str], ModuleType]) -> None:
-    mpl.use("Agg")
-    sections = re.split(r"^## ", (DOCS / "laws.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    for law in hook("laws").LAWS:
-        picture = f"media/law-{law.name}.svg"
-        explained = [section for section in sections if picture in section]
-        assert len(explained) == 1, law.name
-        assert "$$" in explained[0], law.name
-        assert (DOCS / picture).is_file()

@@ -90,11 +90,7 @@ def test_the_python_of_the_readme_runs(installed: Path, tmp_path: Path) -> None:
     run(installed / "python", script, cwd=tmp_path)
 
 
-def test_the_commands_of_the_readme_are_there(installed: Path, tmp_path: Path) -> None:
-    commands = {line.split()[1] for _, _, line in blocks("README.md") if line.startswith("posse ")}
-    assert commands
-    for command in sorted(commands):
-        run(installed / "posse", command, "--help", cwd=tmp_path)
+def test_the_installed_command_works(installed: Path, tmp_path: Path) -> None:
     assert "smart" in run(installed / "posse", "scenarios", cwd=tmp_path)
     run(installed / "posse", "replay", "idle", "--seconds", "1", cwd=tmp_path)
     assert (tmp_path / "replay.html").stat().st_size > 10_000

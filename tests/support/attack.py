@@ -1,5 +1,6 @@
 """A common interface to every kind of environment: invalid inputs, and the whole state."""
 
+import copy
 import functools
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -115,17 +116,9 @@ class Subject:
         batch, env = self.batch, self.env
         kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}]
         kept.append([batch.seed, batch._started, batch._over])
-        if self.kind in ("parallel", "team", "solo", "tracker"):
-            world = env.unwrapped
-            kept.append(world._seeded)
-        if self.kind in ("team vector", "solo vector"):
-            kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
-        if self.kind in ("team", "solo", "tracker"):
+        kept.append([copy.copy(getattr(env, name, None)) for name in ("_seeded", "_seed", "agents")])
+        if isinstance(env, (gymnasium.Env, VectorEnv)):
             kept.append(repr(env.np_random.bit_generator.state))
-        if self.kind == "parallel":
-            kept.append(list(env.agents))
-        if self.kind == "torchrl":
-            kept.append(env._seed)
         return kept
 
 

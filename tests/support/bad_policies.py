@@ -3,7 +3,6 @@
 import ctypes
 import os
 import signal
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -39,11 +38,6 @@ class Hangs(Idle):
         Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
         ctypes.PyDLL(None).sleep(600)
         raise AssertionError
-
-
-class Exits(Idle):
-    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
-        sys.exit(0)
 
 
 class Crashes(Idle):

@@ -41,18 +41,11 @@ def chromium() -> Iterator[Browser]:
 
 @contextmanager
 def opened(
-    browser: Browser,
-    path: Path,
-    address: str = "",
-    *,
-    size: tuple[int, int] = (1200, 800),
-    dark: bool = False,
-    still: bool = False,
+    browser: Browser, path: Path, address: str = "", *, size: tuple[int, int] = (1200, 800), still: bool = False
 ) -> Iterator[Page]:
     """Open a file; fail if it makes a request or writes to the console. ``still``: the user wants no motion."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
-        color_scheme="dark" if dark else "light",
         reduced_motion="reduce" if still else "no-preference",
         device_scale_factor=1,
     )
@@ -78,24 +71,16 @@ def until(page: Page, expression: str) -> None:
 
 
 class Tags(HTMLParser):
-    """Every tag with its attributes, all text, and the contents of scripts and styles by their id."""
+    """Every tag with its attributes, and all text."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.text = ""
-        self.inline: dict[str, str] = {}
-        self._inside: str | None = None
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
-        self._inside = dict(attrs).get("id") or tag if tag in ("script", "style") else None
-
-    def handle_endtag(self, tag: str) -> None:
-        self._inside = None
 
     def handle_data(self, data: str) -> None:
         self.text += data
-        if self._inside:
-            self.inline[self._inside] = self.inline.get(self._inside, "") + data

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 import ray
@@ -16,7 +15,6 @@ from ray.cluster_utils import Cluster
 from safetensors.numpy import load_file
 from tests.support.bad_policies import Watched
 
-from posse_baselines import load
 from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.errors import PlayError
@@ -60,13 +58,6 @@ def begun(folder: Path) -> int:
     return len(list(folder.glob("begun-*")))
 
 
-def test_it_is_equal_to_a_local_run(nodes: Cluster, local: Results, folder: Path) -> None:
-    learned = evaluate("learned-smart", "smart", 12, **SHORT)
-    assert_equal(evaluate(load("learned-smart"), "smart", 12, **THERE).columns, learned.columns)
-    assert_equal(evaluate("pursuit", "smart", EPISODES, **THERE).columns, local.columns)
-    assert list(folder.iterdir()) == []
-
-
 def test_a_worker_that_dies_costs_its_shard(nodes: Cluster, local: Results, folder: Path) -> None:
     assert_equal(evaluate(Watched(folder, "die"), "smart", EPISODES, **THERE).columns, local.columns)
     assert begun(folder) == SHARDS + 1
@@ -103,7 +94,7 @@ def test_a_policy_that_fails_or_kills_its_workers_is_named(nodes: Cluster, folde
 
 COMPARE = "--episodes 3 --planner-episodes 1 --no-figures"
 COMMANDS = {
-    f"compare idle pursuit --scenario smart constant {COMPARE}": "summary.json",
+    f"compare idle learned-smart --scenario smart constant {COMPARE}": "summary.json",
     f"compare idle tests.support.bad_policies:Crashes --scenario constant {COMPARE}": "constant-idle.csv",
     f"compare idle --target evader --scenario duel {COMPARE}": "summary.json",
     "tune pngl-l-phi --scenario constant --only gain near --population 4 --worlds 2 --generations 2": "tuned.json",
@@ -115,17 +106,6 @@ def test_a_command_gives_the_same_file(command: str, nodes: Cluster, folder: Pat
     status = [main([*command.split(), "--out", name, *more]) for name, *more in (["here"], ["there", "--ray"])]
     assert status[0] == status[1] == int("Crashes" in command)
     assert filecmp.cmp(folder / "here" / COMMANDS[command], folder / "there" / COMMANDS[command], shallow=False)
-    assert not WORK.exists()
-
-
-def test_an_interrupted_comparison_resumes(nodes: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    command = [*f"compare idle pursuit --scenario smart constant {COMPARE} --ray".split()]
-    with monkeypatch.context() as patch:
-        patch.setattr(Results, "write", Mock(side_effect=KeyboardInterrupt))
-        assert main(command) == 130
-    assert WORK.is_dir()
-    monkeypatch.setattr("posse_training.parallel._play", None)  # no shard is played
-    assert main(command) == 0
     assert not WORK.exists()
 
 

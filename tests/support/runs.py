@@ -17,6 +17,7 @@ from posse_training.train.checkpoint import read_checkpoint
 from posse_training.train.train import train
 
 HORIZON = 40
+SHORT: dict[str, Any] = {"horizon": HORIZON, "settle_time": 1.0}
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:
@@ -29,7 +30,7 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
         folder=folder,
         num_worlds=4,
         team_sizes=(2,),
-        overrides={"horizon": HORIZON, "settle_time": 1.0},
+        overrides=SHORT,
         hidden=(16, 16),
         minibatch=64,
         rollout=20,
@@ -101,12 +102,7 @@ def killed_at(owner: Any, name: str, call: int) -> Iterator[None]:
             yield
 
 
-GUARDED: dict[str, Any] = {
-    "scenario": "smart",
-    "safeguard": True,
-    "end_on_contact": True,
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
-}
+GUARDED: dict[str, Any] = {"scenario": "smart", "safeguard": True, "end_on_contact": True, "overrides": SHORT}
 """From nothing, behind the safeguard."""
 TARGET: dict[str, Any] = {
     "scenario": "smart",
@@ -117,7 +113,7 @@ TARGET: dict[str, Any] = {
     "steps": 640,
     "evaluate_every": 320,
     "checkpoint_every": 160,
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+    "overrides": {**SHORT, "num_trackers": 3},
     "reward_weights": {"team": -1.0, "contact": -0.5},
 }
 """Of a target against two teams."""
@@ -126,6 +122,6 @@ AGAINST: dict[str, Any] = {
     "team": None,
     "target": "smart,evader",
     "team_sizes": (),
-    "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+    "overrides": {**SHORT, "num_trackers": 3},
 }
 """Of a team against two targets, of which one is learned."""

@@ -12,7 +12,7 @@ EXTRAS = {
     "datasets": ["minari"],
     "export": ["onnx"],
     "cluster": ["ray"],
-    "video": ["moviepy"],
+    "video": ["imageio_ffmpeg", "moviepy"],
 }
 BLOCK = """
 import sys
@@ -70,6 +70,7 @@ def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> 
         ("training", "train"),
         ("datasets", "record idle --scenario constant --out here"),
         ("export", "export evader --out here.onnx"),
+        ("video", "watch idle --out film.mp4"),
         ("cluster", "compare idle --episodes 2 --ray"),
         ("cluster", "train --steps 1000 --seed 1 2 --ray"),
         ("cluster", "tune pngl-l-phi --ray"),

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
-from tests.support.runs import TARGET, killed_at, quiet, resume, small
+from tests.support.runs import killed_at, quiet, resume, small
 
 import posse
 from posse_baselines import begin, load
 from posse_training import evolution
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.evaluation import evaluate
 from posse_training.evolution import Candidates
 from posse_training.train import default_settings
@@ -80,8 +80,6 @@ def test_its_defaults_correct_the_tuned_script() -> None:
     found = default_settings("robots", "cmaes")
     assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
     assert found == default_settings("robots", preset="residual")
-    with pytest.raises(SettingsError, match="preset='residual' goes with cmaes, not ppo"):
-        default_settings("robots", "ppo", preset="residual")
 
 
 def test_another_run_is_where_it_begins(tmp_path: Path) -> None:
@@ -105,15 +103,3 @@ def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
     alone = [Candidates(settings, weights[k : k + 1], {}).scores(5, None)[0] for k in range(3)]
     assert together == pytest.approx(alone, abs=0.02)
     assert np.ptp(alone) > 0.05
-
-
-def test_it_needs_a_script_and_its_first_weights(tmp_path: Path) -> None:
-    for changes, message in (
-        ({}, "corrects a script: set advise"),
-        ({**EVOLVED, "imitate": "idle"}, "imitate='idle' does not go with cmaes"),
-        ({**EVOLVED, "message_size": 2}, "message_size=2 does not go with cmaes"),
-        (TARGET, "corrects no script: use ppo"),
-    ):
-        with pytest.raises(SettingsError, match=message):
-            train(small(tmp_path / "run", "cmaes", **changes), console=quiet())
-        assert not (tmp_path / "run").exists()

@@ -1,6 +1,5 @@
 """A film shows each policy on the same world."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,7 @@ from PIL import Image
 
 from posse.rendering.style import TARGET
 from posse_baselines import load
-from posse_training.errors import MissingExtraError
 from posse_training.film import film
-from posse_training.replay.page import PLAYERS
 
 Frames = npt.NDArray[np.uint8]
 PURSUIT, IDLE = ("one", load("pursuit")), ("two", load("idle"))
@@ -40,9 +37,6 @@ def test_panels_stand_side_by_side_on_the_same_world(tmp_path: Path) -> None:
     np.testing.assert_array_equal(first, third)
     np.testing.assert_array_equal(first[0], second[0])
     assert (first[-1] != second[-1]).any()
-    assert np.abs(frames[0, 1, [100, 300, 500]].astype(int) - PLAYERS[:3]).max() <= 4  # each team's colour above it
-    target = np.abs(frames.astype(int) - TARGET).max(axis=-1) <= 4  # a flat colour is kept, however small its area
-    assert (target.sum(axis=(1, 2)) > 20).all()
 
 
 def test_frames_may_be_left_out_and_a_film_may_begin_later(tmp_path: Path) -> None:
@@ -52,6 +46,8 @@ def test_frames_may_be_left_out_and_a_film_may_begin_later(tmp_path: Path) -> No
     assert (len(whole), times[0]) == (31, 100)
     assert (len(part), longer[0]) == (5, 500)
     np.testing.assert_array_equal(part, whole[10::5])
+    with pytest.raises(ValueError, match=r"every=1\.5 must be a whole number"):
+        film([PURSUIT], "smart", path=tmp_path / "c.gif", every=1.5)  # type: ignore[arg-type]
 
 
 def test_an_mp4_has_the_frames_and_the_length_asked_for(tmp_path: Path) -> None:
@@ -66,28 +62,6 @@ def test_an_mp4_has_the_frames_and_the_length_asked_for(tmp_path: Path) -> None:
     reader.close()
     assert (np.abs(first.astype(int) - TARGET).max(axis=-1) < 40).sum() > 20
     assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"path": "film.mp4"}, r"imageio_ffmpeg.*\[video\]"),
-        ({"seconds": 0.0}, "seconds=0.0 must be"),
-        ({"every": 1.5}, "every=1.5 must be a whole number"),
-        ({"size": (400, 100)}, r"size=\(400, 100\) must be at least 200"),
-        ({"start": 60.0}, r"start=60.0 \(--from\) must be 0 to below 60 s"),
-        ({"target_motion": "agent"}, "the target of 'smart' is an agent"),
-    ],
-)
-def test_what_cannot_be_filmed_is_named(
-    wrong: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    settings = {"policies": [IDLE], "scenario": "smart", "path": "a.gif"} | wrong
-    with pytest.raises((ValueError, MissingExtraError), match=message):
-        film(**settings)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_film_ends_with_the_episode_and_has_curves_below(tmp_path: Path) -> None:

@@ -9,9 +9,8 @@ import pytest
 from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, killed_at, quiet
 
-from posse_baselines import PolicyError
 from posse_training import evolution, league
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.league import LeagueSettings, draw_matrix, play_league, shares, tables
 from posse_training.train.train import Run
 
@@ -70,8 +69,6 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     assert again.cells == found.cells
     files = draw_matrix(again)
     assert all(path.stat().st_size > 1000 for path in files)
-    told = "worlds a pair, test split, seed 7; training seed 1<"
-    assert told in files[1].read_text(), "the figure says what was played"
     matrix, responses = tables(again)
     assert matrix.row_count == 3
     assert responses.row_count == 2
@@ -89,24 +86,6 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     (tmp_path / "league.json").write_text("[")
     with pytest.raises(RunFolderError, match="is damaged"):
         play_league(settings, console=quiet())
-
-
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"teams": ()}, SettingsError, "teams"),
-        ({"targets": ("smart,evader",)}, SettingsError, "without commas"),
-        ({"teams": ("a/best.json", "b/best.json")}, SettingsError, "must have different names"),
-        ({"teams": ("nobody",)}, PolicyError, "unknown policy 'nobody'"),
-        ({"targets": ("nobody",)}, PolicyError, "unknown target 'nobody'"),
-    ],
-)
-def test_what_is_impossible_is_refused_before_anything_is_made(
-    changes: dict[str, Any], error: type[Exception], message: str, tmp_path: Path
-) -> None:
-    with pytest.raises(error, match=message):
-        play_league(tiny(tmp_path / "league", **changes), console=quiet())
-    assert not (tmp_path / "league").exists()
 
 
 def test_harder_opponents_get_more_of_the_worlds() -> None:

@@ -10,7 +10,7 @@ from tests.support.runs import killed_at, quiet
 from tests.support.tunable import BEST, POLICY, small
 
 from posse_baselines import DDCS, tunables
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.tune import Space, TuneSettings, _Run, tune
 
@@ -65,12 +65,6 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
     path.write_text(path.read_text()[:100])
     with pytest.raises(RunFolderError, match=r"state\.json is damaged"):
         tune(small(tmp_path / "run"), console=quiet())
-
-
-def test_a_search_without_any_effect_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_Run, "_effective", lambda _: [])
-    with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
-        tune(small(tmp_path), console=quiet())
 
 
 def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_default() -> None:

@@ -3,7 +3,6 @@
 import re
 import runpy
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +17,6 @@ from posse_training import evaluate
 
 TUTORIALS = ROOT / "docs" / "tutorials"
 NUMBER = r"(\d\.\d+)"
-
-
-@pytest.fixture(autouse=True)
-def threads() -> Iterator[None]:
-    """Restore torch's number of threads, which a tutorial may change."""
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)
 
 
 def run(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> dict[str, Any]:
@@ -82,10 +73,3 @@ def test_cleanrl_ppo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     step = left["rewards"] + left["args"].discount * left["nexts"] - left["values"]
     torch.testing.assert_close(left["advantages"][at], step[at])
     assert (left["advantages"][at - 1] != step[at - 1]).all()
-
-
-def test_every_tutorial_is_tried_and_has_its_place_in_the_manual() -> None:
-    pages = "".join(path.read_text() for path in (ROOT / "docs").glob("*.md"))
-    for name in {path.name for path in TUTORIALS.glob("*.py")} - {"step_loop.py"}:  # that: tests/docs/test_pages.py
-        assert f'"{name}"' in Path(__file__).read_text()
-        assert f'--8<-- "docs/tutorials/{name}"' in pages

@@ -11,7 +11,6 @@ from tests.support.learned import policy_for, target_for
 
 import posse
 from posse.scenarios.named import SCENARIOS
-from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
@@ -60,22 +59,6 @@ def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
     best = sorted(safe, key=lambda policy: -safe[policy].mean())
     assert [row["policy"] for row in ranked(found.rows)] == best
     assert best[0] == "planner"
-
-
-def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
-    for named, message in (
-        ("idel", "unknown policy 'idel'"),
-        ("mine=", "'mine=' is not a group of policies"),
-        ("mine=idle,,pursuit", "is not a group of policies"),
-        ("idle=pursuit", "two policies have the label 'idle'"),
-    ):
-        with pytest.raises(PolicyError, match=message):
-            compare(Settings(("idle", named), ("constant",), out=tmp_path))
-    with pytest.raises(PolicyError, match="No policies given"):
-        compare(Settings((), ("constant",), out=tmp_path))
-    with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
-        compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_goes_by_the_name_on_its_card(files: list[str], tmp_path: Path) -> None:

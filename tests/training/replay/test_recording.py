@@ -14,7 +14,7 @@ import posse
 from posse_baselines import Recorder, Trajectory, begin, load
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
-from posse_training.replay import RECORD, Player, Replay, join, record, replay_of
+from posse_training.replay import RECORD, Player, Replay, record, replay_of
 from posse_training.replay.columns import find_events
 from posse_training.replay.format import decode, encode, resolution_of
 
@@ -94,23 +94,6 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
         assert player.metrics[name] == pytest.approx(float(value[0]), nan_ok=True)
 
 
-def test_the_world_is_described() -> None:
-    world = short().world
-    assert (world["seed"], world["split"], world["world"]) == (3, "test", 1)
-    field = posse.get_scenario("field")
-    assert (world["settings"]["name"], world["settings"]["version"]) == ("field", field.version)
-    assert world["changed"] == {"num_trackers": [5, 4]}
-    batch = posse.batch("field", 1, seed=3, split="test", first_world=1, num_trackers=4)
-    batch.reset()
-    state = batch.state
-    obstacles = np.stack([state[f"obstacle_{k}"][0] for k in ("x", "y", "radius")], -1)
-    np.testing.assert_array_equal(np.array(world["obstacles"], np.float32), obstacles)
-    # Both players' fields: the message of a team-mate is only in the first one's observation.
-    names = [field["name"] for field in world["fields"]]
-    assert set(names) == {field.name for field in batch.layout.fields} | {"neighbour_message"}
-    assert [p.name for p in short().players] == ["ddcs-distributed", "pursuit"]
-
-
 def driven(batch: posse.Batch, steps: int) -> Trajectory:
     recorder = Recorder(batch, RECORD)
     recorder.reset()
@@ -123,37 +106,12 @@ def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
     many = replay_of(driven(posse.batch("radio", 5, seed=2), 30).episode(3), "a")
     alone = replay_of(driven(posse.batch("radio", 1, seed=2, first_world=3), 30), "a")
     assert many.world == alone.world
+    assert [many.world[name] for name in ("seed", "split", "world", "episode")] == [2, "train", 3, 0]
     one, other = many.players[0], alone.players[0]
     assert list(one.columns) == list(other.columns)
     for name, values in one.columns.items():
         np.testing.assert_array_equal(values, other.columns[name])
     assert one.events == other.events
-
-
-def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
-    one, two = record(["idle"], "smart", seconds=1), record(["pursuit"], "smart", seconds=1)
-    joined = join([one, two])
-    assert [player.name for player in joined.players] == ["idle", "pursuit"]
-    talker = record(["ddcs-distributed"], "smart", seconds=1)
-    assert len(join([one, talker]).players) == 2  # the length of messages does not count
-    other = record(["pursuit"], "smart", seconds=1, world=1, tolerance=0.2)
-    with pytest.raises(SettingsError, match="same world: tolerance, world differ"):
-        join([one, other])
-    with pytest.raises(SettingsError, match="1 to 4 players, got 5"):
-        join([one] * 5)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"seconds": float("nan")}, "seconds=nan must be above 0"),
-        ({"world": -1}, "first_world=-1 must be"),
-        ({"target_motion": "agent"}, "the target of 'smart' is an agent"),
-    ],
-)
-def test_what_cannot_be_recorded_is_named(wrong: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        record(**({"policies": ["idle"], "scenario": "smart"} | wrong))
 
 
 def test_contacts_are_told_with_who_touched_what() -> None:

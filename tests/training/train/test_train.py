@@ -86,7 +86,7 @@ def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: 
     assert steps_saved(tmp_path / "run") == 2560
 
 
-def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path) -> None:
+def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     deviations = []
     usual = PPO.train
 
@@ -94,10 +94,8 @@ def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path) -> None:
         deviations.append(self.policy.log_std.max().item())
         usual(self)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(PPO, "train", note)
-        settings = small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0)
-        train(settings, console=quiet())
+    monkeypatch.setattr(PPO, "train", note)
+    train(small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0), console=quiet())
     assert len(deviations) == 8
     for k, deviation in enumerate(deviations):
         assert deviation == pytest.approx(-1.0 - 2.0 * k / 8, abs=0.02)
