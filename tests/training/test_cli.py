@@ -112,7 +112,7 @@ INVALID = {
     "train --algorithm sac --preset residual": "preset='residual' goes with cmaes, not sac",
     "train --algorithm sac --no-safeguard --imitate pursuit": "needs algorithm ppo or mappo, not sac: leave it out",
     "train --algorithm cmaes --advise None --encoding plain": "corrects a script: set advise",
-    "train --algorithm cmaes --start runs/a": "start=runs/a has no state.json",
+    "train --algorithm cmaes --start runs/a": "start='runs/a' does not go with cmaes",
     "train --algorithm cmaes --message-size 2": "message_size=2 does not go with cmaes",
     "train --algorithm cmaes --side target": "corrects no script: use ppo",
     "train --advise ddcs-distributed": "needs algorithm cmaes, not ppo",

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,17 +79,6 @@ def test_its_defaults_correct_the_tuned_script() -> None:
     found = default_settings("robots", "cmaes")
     assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
     assert found == default_settings("robots", preset="residual")
-
-
-def test_another_run_is_where_it_begins(tmp_path: Path) -> None:
-    train(small(tmp_path / "a", "cmaes", **EVOLVED), console=quiet())
-    further = small(tmp_path / "b", "cmaes", **EVOLVED, start=str(tmp_path / "a"))
-    train(replace(further, deviation=1e-6, steps=1), console=quiet())
-    mine, other = (load_file(tmp_path / name / "last.safetensors")["layers.0.weight"] for name in "ab")
-    np.testing.assert_allclose(other, mine, atol=1e-4)
-    with pytest.raises(RunFolderError, match=r"has no state\.json"):
-        train(replace(further, folder=tmp_path / "c", start=str(tmp_path)), console=quiet())
-    assert not (tmp_path / "c").exists()
 
 
 def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:

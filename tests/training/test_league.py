@@ -9,7 +9,7 @@ import pytest
 from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, killed_at, quiet
 
-from posse_training import evolution, league
+from posse_training import league
 from posse_training.errors import RunFolderError
 from posse_training.league import LeagueSettings, draw_matrix, play_league, shares, tables
 from posse_training.train.train import Run
@@ -27,7 +27,6 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
         training={
             "num_worlds": 16,
-            "population": 4,
             "rollout": 5,
             "minibatch": 32,
             "epochs": 1,
@@ -59,7 +58,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     assert [e.label for e in found.exploited] == ["trackers-2", "target-2"]
     gained = found.exploited[0]
     assert gained.gain == pytest.approx(gained.before["score"].value - gained.after["score"].value), "of a target"
-    for owner, name, call in ((Run, "_on_rollout_start", 4), (evolution, "write_json", 1), (league, "evaluate", 9)):
+    for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
         with killed_at(owner, name, call):
             play_league(tiny(tmp_path / "cut"), console=quiet())
     play_league(tiny(tmp_path / "cut"), console=quiet())

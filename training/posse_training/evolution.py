@@ -26,7 +26,7 @@ from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.safeguard import MOTION, check_adviser
-from posse_training.errors import RunFolderError, require
+from posse_training.errors import require
 from posse_training.files import hold_settings, intact
 from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
@@ -54,7 +54,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     s, basis = settings, _basis(Encoding(settings.encoding, 0, ()))
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
-    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0, "mean": []}
+    state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
         with intact(folder / STATE):
             kept = read_json(folder / STATE)
@@ -80,8 +80,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
             team([cma.mean], make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
-    mean = np.zeros(len(basis)) if s.start is None else mean_of(Path(s.start))
-    cma = CMA(mean=mean, sigma=s.deviation, seed=s.seed, population_size=s.population)
+    cma = CMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
     each = s.population * _steps_of(s)  # of a generation
     generations = -(-s.steps // each)
     display.begin(len(scores) * each, generations * each)
@@ -96,7 +95,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.progress(steps, float(np.mean(scores[-1])))
         if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every or generation + 1 == generations:
             evaluate(steps)
-        state |= {"seconds": time.monotonic() - started, "mean": cma.mean.tolist()}
+        state["seconds"] = time.monotonic() - started
         write_json(folder / STATE, state, indent=None)
     team([cma.mean], make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
@@ -111,18 +110,6 @@ def adviser_of(settings: TrainSettings) -> Policy:
     adviser = load(str(settings.advise))
     check_adviser(adviser, believes=settings.encoding == "belief")
     return adviser
-
-
-def mean_of(folder: Path) -> npt.NDArray[np.float64]:
-    """Return the weights at which a search ended.
-
-    Raises:
-        RunFolderError: The folder holds no search, or one whose state is damaged.
-    """
-    if not (folder / STATE).is_file():
-        raise RunFolderError(f"start={folder} has no {STATE}: name the run folder of a correction")
-    with intact(folder / STATE):
-        return np.array(read_json(folder / STATE)["mean"], np.float64)
 
 
 class Candidates(LearnedPolicy):

@@ -28,7 +28,6 @@ from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked
 from posse_training.options import Changes, Pairs
-from posse_training.train.algorithms import EVOLUTION
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, TrainSettings
 
@@ -62,9 +61,9 @@ class LeagueSettings:
     targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
     """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
     target_steps: int = number(2_000_000, "", *_STEPS)
-    """Steps of each target's training, by ppo."""
-    team_steps: int = number(80_000_000, "", *_STEPS)
-    """Steps of each team's training, of one tracker each: evolution of a correction of ddcs-tuned."""
+    """Steps of each target's training."""
+    team_steps: int = number(6_000_000, "", *_STEPS)
+    """Steps of each team's training, of one tracker each."""
     responses: Literal["last", "all", "none"] = "last"
     """For which generations a best response is trained, which says how much it can be exploited."""
     longer: int = number(1, "", 1, 1000)
@@ -207,7 +206,7 @@ class League:
         self.console.print(f"{trained.label}: {run}", markup=False)
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
-            **default_settings(s.scenario, EVOLUTION if side == TEAM else None, side=side).to_dict(),
+            **default_settings(s.scenario, side=side).to_dict(),
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,

@@ -174,7 +174,7 @@ def check_algorithm(settings: TrainSettings) -> None:
     if kind is None:
         if settings.advise is None:
             raise SettingsError(f"algorithm={name!r} corrects a script: set advise, for example to ddcs-tuned")
-        for other in ("imitate", "message_size", "safeguard", "wandb"):
+        for other in ("start", "imitate", "message_size", "safeguard", "wandb"):
             if value := getattr(settings, other):
                 raise SettingsError(
                     f"{other}={value!r} does not go with {name}, whose team begins as its adviser, which safeguards "

@@ -16,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
-from posse_training.evolution import adviser_of, evolve, mean_of
+from posse_training.evolution import adviser_of, evolve
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
@@ -102,9 +102,7 @@ def check_before(settings: TrainSettings) -> None:
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             LOAD[settings.side](policy)
-    if settings.start is not None and settings.algorithm == EVOLUTION:
-        mean_of(Path(settings.start))
-    elif settings.start is not None:
+    if settings.start is not None:
         checkpoint.read_checkpoint(Path(settings.start))
 
 
