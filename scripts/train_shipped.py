@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import tyro
 from rich.console import Console
 
+from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_training.errors import SettingsError
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
@@ -22,8 +23,9 @@ CORRECTIONS: Final = (
     *("corrected-search", "learned-robots"),
 )
 """Teams that correct the script on the scenario of their name."""
-FROM_NOTHING: Final = ("smart", "radio")
-"""Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
+DUEL: Final = {"target": ",".join(("smart", "constant", *OPEN_LOOP, *(3 * ("evader",)))), "num_worlds": 264}
+FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {"smart": {}, "radio": {}, "duel": DUEL}
+"""Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
 SEEDS: Final = {"smart": 5, "field": 5}
 """Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
 
@@ -33,13 +35,16 @@ def scenario_of(team: str) -> str:
     return team.partition("-")[2]
 
 
+SCENARIOS: Final = (*map(scenario_of, CORRECTIONS), "duel")
+
+
 @dataclass(frozen=True)
 class Settings:
     """Command-line arguments."""
 
     seed: tuple[int, ...] = ()
     """Training seeds; default: 1 to 3, of the corrections for smart and field 1 to 5."""
-    scenario: tuple[str, ...] = tuple(map(scenario_of, CORRECTIONS))
+    scenario: tuple[str, ...] = SCENARIOS
     """Scenarios to train on."""
     out: Path = Path("runs/shipped")
     """Folder of the run folders, TEAM-SEED."""
@@ -48,9 +53,9 @@ class Settings:
 def all_runs(settings: Settings) -> list[TrainSettings]:
     """Return the settings of all runs, the first seed of every scenario first."""
     for name in settings.scenario:
-        if name not in (known := [scenario_of(team) for team in CORRECTIONS]):
+        if name not in SCENARIOS:
             raise SettingsError(
-                f"scenario={name!r:.80} has no learned team of its own; those that have: {', '.join(known)}"
+                f"scenario={name!r:.80} has no learned team of its own; those that have: {', '.join(SCENARIOS)}"
             )
     runs = []
     for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
@@ -59,10 +64,10 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             if name in settings.scenario and (settings.seed or seed <= SEEDS.get(name, 3)):
                 corrects = default_settings(name, preset="residual")
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"{team}-{seed}"))
-        for name in FROM_NOTHING:
+        for name, changes in FROM_NOTHING.items():
             if name in settings.scenario and (settings.seed or seed <= 3):
                 learns = default_settings(name)
-                runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
+                runs.append(replace(learns, **changes, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
 
 
