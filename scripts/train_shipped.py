@@ -23,7 +23,7 @@ CORRECTIONS: Final = (
     *("corrected-search", "learned-robots"),
 )
 """Teams that correct the script on the scenario of their name."""
-DUEL: Final = {"target": ",".join(("smart", "constant", *OPEN_LOOP, *(3 * ("evader",)))), "num_worlds": 264}
+DUEL: Final = {"target": ",".join(("smart", "constant", *OPEN_LOOP, *(3 * ("evader",)))), "num_worlds": 260}
 FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {"smart": {}, "radio": {}, "duel": DUEL}
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
 SEEDS: Final = {"smart": 5, "field": 5}

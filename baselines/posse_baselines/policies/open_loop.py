@@ -19,6 +19,8 @@ from posse.numeric import BoolArray, FloatArray
 Clock = tuple[float, FloatArray]
 """Memory: the control step in s, and the times (E,) in s since the start of each episode."""
 _MOTIONS: Final[dict[str, Callable[[FloatArray], tuple[npt.ArrayLike, npt.ArrayLike]]]] = {
+    "standing": lambda times: (0.0, 0.0),
+    "slow": lambda times: (0.5, 0.0),
     "left-circle": lambda times: (1.0, 1.0),
     "right-circle": lambda times: (1.0, -1.0),
     "wide-circle": lambda times: (1.0, 0.5),
