@@ -24,6 +24,7 @@ CORRECTIONS: Final = (
 )
 """Teams that correct the script on the scenario of their name."""
 DUEL: Final = {"target": ",".join(("smart", "constant", *OPEN_LOOP, *(3 * ("evader",)))), "num_worlds": 260}
+"""Opponents of the team of ``duel``, each with a share of the worlds, and ``evader`` with three."""
 FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {"smart": {}, "radio": {}, "duel": DUEL}
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
 SEEDS: Final = {"smart": 5, "field": 5}
@@ -35,7 +36,8 @@ def scenario_of(team: str) -> str:
     return team.partition("-")[2]
 
 
-SCENARIOS: Final = (*map(scenario_of, CORRECTIONS), "duel")
+SCENARIOS: Final = tuple(dict.fromkeys((*map(scenario_of, CORRECTIONS), *FROM_NOTHING)))
+"""Scenarios with a team of their own."""
 
 
 @dataclass(frozen=True)

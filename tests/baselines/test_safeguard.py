@@ -5,11 +5,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from tests.baselines.laws.test_guidance import body_of
 from tests.support.learned import network_for
 from tests.support.reference.state import directions, points
 
 import posse
 from posse_baselines import PolicyError, Safeguard, rollout
+from posse_baselines.laws.safeguard import DISC, put_disc, safe_velocity
 from posse_baselines.learned import Encoding, LearnedPolicy
 from posse_baselines.safeguard import Guard
 
@@ -144,3 +146,13 @@ def test_invalid_environments_are_not_guarded() -> None:
     batch = posse.batch("smart", 1)
     with pytest.raises(ValueError, match="finite"):
         Guard(batch.layout, 1).actions(np.full((1, 5, 2), np.nan))
+
+
+@pytest.mark.parametrize("turn", [1.5, 0.0, -1.5])
+def test_a_disc_that_turns_is_avoided_where_its_arc_leads(turn: float) -> None:
+    """A quarter of a circle of 0.53 m leads to the robot; straight on it is passed, and more so on the other circle."""
+    disc, radius = np.zeros(1, DISC), 0.8 / 1.5
+    put_disc(disc, 0, complex(-radius, radius), -0.8j, 0.3, 0.15)
+    disc["turn"] = turn
+    _, changed = safe_velocity(body_of(1.0, 0.0, (1.0, 4.0)), disc, 0j)
+    assert changed == (turn > 0.0)

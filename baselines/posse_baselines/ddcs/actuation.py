@@ -101,10 +101,11 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
     if me.known:
         # In a chase the target is not avoided: the law ends the chase in time.
         reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
-        count = put_near(discs, count, me.target - me.position, me.target_velocity, reach, margin)
+        way = me.target - me.position
+        count = put_near(discs, count, way, me.target_velocity, reach, margin)
         if count > 0 and world.target_turns > 0.0:
             for turn in (-world.target_turns, world.target_turns):
-                count = put_disc(discs, count, me.target - me.position, me.target_velocity, reach, margin)
+                count = put_disc(discs, count, way, me.target_velocity, reach, margin)
                 discs[count - 1].turn = turn
     for j in range(len(mates)):
         mate = mates[j]

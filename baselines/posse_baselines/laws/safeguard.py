@@ -158,7 +158,7 @@ def is_clear(body: Record, discs: Records, wanted: complex) -> bool:
         return False
     for j in range(len(discs)):
         d = discs[j]
-        if d.turn != 0.0:
+        if d.turn != 0.0:  # what follows holds for straight courses
             return False
         u = d.velocity - wanted
         closest = clip(-dot(d.place, u) / max(dot(u, u), 1e-9), 0.0, _HORIZON)

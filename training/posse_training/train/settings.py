@@ -91,7 +91,7 @@ class TrainSettings:
 
     # The networks
     encoding: Literal["plain", "slots", "belief"] = "slots"
-    """Network inputs: the observation; with features computed from it; or of cmaes, and the adviser's belief."""
+    """Network inputs: the observation; with features computed from it; for cmaes with the adviser's belief, too."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
