@@ -4,8 +4,9 @@
     python scripts/ship.py runs/train/duel-target-ppo-1 --name evader
     python scripts/ship.py --again     the checks of all that ship, after a scenario's version rose
 
-Of several runs that differ in their training seeds, the best on validation worlds that none was evaluated on ships. A
-target ships only if it costs the reference team more than the scripted one.
+Of several runs that differ in their training seeds, the best on validation worlds that none was evaluated on ships.
+Then all play the worlds of the leaderboard, for the mean over training seeds. A target ships only if it costs the
+reference team more than the scripted one.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import difference, mean
+from posse_training.leaderboard import SEED, WORLDS
 from posse_training.options import words_of
 from posse_training.provenance import commit
 from posse_training.train.presets import default_settings
@@ -65,6 +67,8 @@ class Settings:
     """Name of the team, learned-..., or of the target."""
     worlds: int = 200
     """Worlds of each scenario and team size to judge on."""
+    test_worlds: int = WORLDS
+    """Worlds of the leaderboard that every training seed plays, if it learned one scenario."""
     out: Path | None = None
     """Folder to write to; default: the package's own."""
     again: bool = False
@@ -110,6 +114,10 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
     learned = [policy.card["steps"] > 0 for policy in policies]
     scores = [play["safe_score"].mean() for play in plays]
     best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
+    told = {}
+    if len(trained[0].scenarios) == 1:
+        (own,) = trained[0].scenarios
+        told = {p: evaluate(p, own, settings.test_worlds, SEED).estimate("safe_score") for p in policies}
     seeds = [
         {
             "seed": run.seed,
@@ -117,6 +125,7 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "commit": policy.card.get("commit"),
             "command": command_of(run),
             **{name: asdict(mean(play[name])) for name in _JUDGED},
+            **({"test": asdict(told[policy])} if told else {}),
         }
         for run, policy, play in zip(trained, policies, plays, strict=True)
     ]

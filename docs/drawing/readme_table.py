@@ -35,20 +35,29 @@ def table() -> str:
             continue
         teams = [name for name, r in found.items() if not standings.is_reference(r)]
         script, nothing, correction = (
-            _cell(found, next((name for name in teams if corrects.get(name) is kind), ""), named=True)
+            _cell(found, next((name for name in teams if corrects.get(name) is kind), ""))
             for kind in (None, False, True)
         )
-        baseline, ahead, planner = (_cell(found, name, named=False) for name in (BASELINE, PLAYS_AHEAD, "planner"))
+        baseline, ahead, planner = (_cell(found, name) for name in (BASELINE, PLAYS_AHEAD, "planner"))
         cells = (baseline, script, ahead, nothing, correction, planner)
         lines.append(f"| `{scenario}` | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _cell(found: dict[str, Standing], policy: str, *, named: bool) -> str:
+def _cell(found: dict[str, Standing], policy: str) -> str:
+    """Return a policy's safe score with its interval, share of contact, name, and the mean of its training seeds.
+
+    The planners play fewer worlds: instead of the name, what they gain over ``ddcs-tuned`` there.
+    """
     if policy not in found:
         return ""
-    score = f"{found[policy].safe_score:.3f}"
-    return f"{score} `{policy}`" if named else score
+    row = found[policy]
+    score = f"{row.safe_score:.3f} ± {(row.high - row.low) / 2:.3f}, {1 - row.contact_free:.1%}"
+    if standings.is_reference(row):
+        return f"{score}<br>{row.safe_score - standings.tuned_beside(row):+.3f}"
+    seeds = standings.test_scores(policy)
+    means = f"<br>{len(seeds)} seeds: {sum(seeds) / len(seeds):.3f}" if len(seeds) > 1 else ""
+    return score if policy == BASELINE else f"{score}<br>`{policy}`{means}"
 
 
 def with_table(text: str) -> str:

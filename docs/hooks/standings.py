@@ -13,6 +13,8 @@ from mkdocs.exceptions import PluginError
 import posse
 from declared_tables import code, table
 from posse_baselines import load, policy_names
+from posse_baselines.learned import LearnedPolicy
+from posse_baselines.registry import shipped
 from posse_training.errors import SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.leaderboard import WORLDS, Standing, read_standings
@@ -76,17 +78,29 @@ def results() -> str:
     return table(("team", *SCENARIOS), rows)
 
 
+@functools.cache
+def tuned_beside(row: Standing) -> float:
+    """Return the safe score of `ddcs-tuned` on the worlds of a row."""
+    played = evaluate("ddcs-tuned", row.scenario, row.worlds, row.seed, split="test", progress=False)
+    return float(played["safe_score"].mean())
+
+
 def headroom() -> str:
     """Return what separates the tuned script from the planners on the worlds that these played."""
     rows = []
     for name in SCENARIOS:
         found = {row.label: row for row in of_scenario(name)}
         belief, planner = found["belief-planner"], found["planner"]
-        played = evaluate("ddcs-tuned", name, belief.worlds, belief.seed, split="test", progress=False)
-        script = float(played["safe_score"].mean())
+        script = tuned_beside(belief)
         gains = belief.safe_score - script, planner.safe_score - belief.safe_score
         rows.append((code(name), f"{script:.3f}", *(f"{gain:+.3f}" for gain in gains), f"{planner.safe_score:.3f}"))
     return table(("scenario", "`ddcs-tuned`", "control", "information", "planner"), rows)
+
+
+def test_scores(policy: str) -> list[float]:
+    """Return the safe score of every training seed of a shipped team on the worlds of the leaderboard."""
+    card = LearnedPolicy.from_file(shipped()[policy]).card if policy in shipped() else {}
+    return [run["test"]["value"] for run in card.get("training_seeds", ()) if "test" in run]
 
 
 def training_seeds() -> str:
