@@ -52,9 +52,10 @@ def _cell(found: dict[str, Standing], policy: str) -> str:
     if policy not in found:
         return ""
     row = found[policy]
-    score = f"{row.safe_score:.3f} ± {(row.high - row.low) / 2:.3f}, {1 - row.contact_free:.1%}"
+    half, contact = (row.high - row.low) / 2, 1 - row.contact_free
+    score = f"{row.safe_score:.3f}&nbsp;±&nbsp;{half:.3f}<br>contact&nbsp;{contact:.1%}"
     if standings.is_reference(row):
-        return f"{score}<br>{row.safe_score - standings.tuned_beside(row):+.3f}"
+        return f"{score}<br>gain&nbsp;{row.safe_score - standings.tuned_beside(row):+.3f}"
     seeds = standings.test_scores(policy)
     means = f"<br>{len(seeds)} seeds: {sum(seeds) / len(seeds):.3f}" if len(seeds) > 1 else ""
     return score if policy == BASELINE else f"{score}<br>`{policy}`{means}"
