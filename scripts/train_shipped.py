@@ -23,8 +23,16 @@ CORRECTIONS: Final = (
     *("corrected-search", "learned-robots"),
 )
 """Teams that correct the script on the scenario of their name."""
-DUEL: Final = {"target": ",".join(("smart", "constant", *OPEN_LOOP, *(3 * ("evader",)))), "num_worlds": 260}
-"""Opponents of the team of ``duel``, each with a share of the worlds, and ``evader`` with three."""
+EVADERS: Final = ("evader", "evader-2", "evader-3")
+"""The last targets of three leagues."""
+DUEL: Final = {
+    "target": ",".join(("smart", "constant", *OPEN_LOOP, *(each for each in EVADERS for _ in range(3)))),
+    "num_worlds": 266,
+    "steps": 6_000_000,
+    "start": "runs/league-1/generation-06/trackers",
+}
+"""Opponents of the team of ``duel``, the evaders with three shares of the worlds each; it goes on from the last team of
+the league of seed 1, ``posse league``."""
 FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {"smart": {}, "radio": {}, "duel": DUEL}
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
 SEEDS: Final = {"smart": 5, "field": 5}
