@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 import tyro
 
 from posse import Scenario, get_scenario
@@ -68,7 +69,7 @@ class Settings:
     worlds: int = 200
     """Worlds of each scenario and team size to judge on."""
     test_worlds: int = WORLDS
-    """Worlds of the leaderboard that every training seed plays, if it learned one scenario."""
+    """Worlds of the leaderboard that every training seed plays, likewise."""
     out: Path | None = None
     """Folder to write to; default: the package's own."""
     again: bool = False
@@ -106,18 +107,12 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
     if not settings.name.startswith(LEARNED):
         raise SettingsError(f"name={settings.name!r} must begin with {' or '.join(LEARNED)}")
     _check_one_training(settings.runs, trained)
-    plays = []
-    for policy in policies:
-        played = [evaluate(policy, s, settings.worlds, CHOICE_SEED, split=SPLIT) for s in trained[0].scenarios]
-        plays.append({name: np.concatenate([r[name] for r in played]) for name in _JUDGED})
+    plays = [_play(policy, trained[0].scenarios, settings.worlds, CHOICE_SEED, SPLIT) for policy in policies]
+    tests = [_play(policy, trained[0].scenarios, settings.test_worlds, SEED, "test") for policy in policies]
     # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
     learned = [policy.card["steps"] > 0 for policy in policies]
     scores = [play["safe_score"].mean() for play in plays]
     best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
-    told = {}
-    if len(trained[0].scenarios) == 1:
-        (own,) = trained[0].scenarios
-        told = {p: evaluate(p, own, settings.test_worlds, SEED).estimate("safe_score") for p in policies}
     seeds = [
         {
             "seed": run.seed,
@@ -125,9 +120,9 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "commit": policy.card.get("commit"),
             "command": command_of(run),
             **{name: asdict(mean(play[name])) for name in _JUDGED},
-            **({"test": asdict(told[policy])} if told else {}),
+            "test": {name: asdict(mean(test[name])) for name in _JUDGED},
         }
-        for run, policy, play in zip(trained, policies, plays, strict=True)
+        for run, policy, play, test in zip(trained, policies, plays, tests, strict=True)
     ]
     return policies[best].with_card(
         {
@@ -140,6 +135,14 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "check": make_check(policies[best], trained[0].scenarios),
         }
     )
+
+
+def _play(
+    policy: LearnedPolicy, scenarios: Sequence[Scenario], worlds: int, seed: int, split: str
+) -> dict[str, npt.NDArray[np.float64]]:
+    """Return what a policy is judged by in each world of all scenarios."""
+    played = [evaluate(policy, scenario, worlds, seed, split=split) for scenario in scenarios]
+    return {name: np.concatenate([results[name] for results in played]) for name in _JUDGED}
 
 
 def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_training.errors import SettingsError
+from posse_training.league import LeagueSettings, play_league
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
@@ -23,16 +24,18 @@ CORRECTIONS: Final = (
     *("corrected-search", "learned-robots"),
 )
 """Teams that correct the script on the scenario of their name."""
+LEAGUE: Final = LeagueSettings(
+    scenario="duel", generations=6, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
+)
 EVADERS: Final = ("evader", "evader-2", "evader-3")
 """The last targets of three leagues."""
 DUEL: Final = {
     "target": ",".join(("smart", "constant", *OPEN_LOOP, *(each for each in EVADERS for _ in range(3)))),
     "num_worlds": 266,
     "steps": 6_000_000,
-    "start": "runs/league-1/generation-06/trackers",
+    "start": str(LEAGUE.path / "generation-06" / "trackers"),
 }
-"""Opponents of the team of ``duel``, the evaders with three shares of the worlds each; it goes on from the last team of
-the league of seed 1, ``posse league``."""
+"""Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
 FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {"smart": {}, "radio": {}, "duel": DUEL}
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
 SEEDS: Final = {"smart": 5, "field": 5}
@@ -86,5 +89,7 @@ if __name__ == "__main__":
     for run in all_runs(tyro.cli(Settings, description=__doc__)):
         if (run.run_folder / LAST).is_file():
             console.print(f"finished: {run.run_folder}", markup=False)
-        else:
-            train(run, console=console)
+            continue
+        if run.start is not None:
+            play_league(LEAGUE, console=console)  # trains what is missing
+        train(run, console=console)

@@ -55,8 +55,9 @@ def _cell(found: dict[str, Standing], policy: str) -> str:
     half, contact = (row.high - row.low) / 2, 1 - row.contact_free
     score = f"{row.safe_score:.3f}&nbsp;±&nbsp;{half:.3f}<br>contact&nbsp;{contact:.1%}"
     if standings.is_reference(row):
-        return f"{score}<br>gain&nbsp;{row.safe_score - standings.tuned_beside(row):+.3f}"
-    seeds = standings.test_scores(policy)
+        beside = standings.tuned_beside(row.scenario, row.worlds, row.seed)
+        return f"{score}<br>gain&nbsp;{row.safe_score - beside:+.3f}"
+    seeds = standings.test_scores(row)
     means = f"<br>{len(seeds)} seeds: {sum(seeds) / len(seeds):.3f}" if len(seeds) > 1 else ""
     return score if policy == BASELINE else f"{score}<br>`{policy}`{means}"
 

@@ -79,9 +79,9 @@ def results() -> str:
 
 
 @functools.cache
-def tuned_beside(row: Standing) -> float:
-    """Return the safe score of `ddcs-tuned` on the worlds of a row."""
-    played = evaluate("ddcs-tuned", row.scenario, row.worlds, row.seed, split="test", progress=False)
+def tuned_beside(scenario: str, worlds: int, seed: int) -> float:
+    """Return the safe score of `ddcs-tuned` on worlds of the leaderboard."""
+    played = evaluate("ddcs-tuned", scenario, worlds, seed, split="test", progress=False)
     return float(played["safe_score"].mean())
 
 
@@ -91,16 +91,18 @@ def headroom() -> str:
     for name in SCENARIOS:
         found = {row.label: row for row in of_scenario(name)}
         belief, planner = found["belief-planner"], found["planner"]
-        script = tuned_beside(belief)
+        script = tuned_beside(name, belief.worlds, belief.seed)
         gains = belief.safe_score - script, planner.safe_score - belief.safe_score
         rows.append((code(name), f"{script:.3f}", *(f"{gain:+.3f}" for gain in gains), f"{planner.safe_score:.3f}"))
     return table(("scenario", "`ddcs-tuned`", "control", "information", "planner"), rows)
 
 
-def test_scores(policy: str) -> list[float]:
-    """Return the safe score of every training seed of a shipped team on the worlds of the leaderboard."""
-    card = LearnedPolicy.from_file(shipped()[policy]).card if policy in shipped() else {}
-    return [run["test"]["value"] for run in card.get("training_seeds", ()) if "test" in run]
+def test_scores(row: Standing) -> list[float]:
+    """Return the safe score of every training seed of a shipped team, where the row is of the scenario it learned."""
+    card = LearnedPolicy.from_file(shipped()[row.policy]).card if row.policy in shipped() else {"scenarios": []}
+    if [scenario["name"] for scenario in card["scenarios"]] != [row.scenario]:
+        return []
+    return [run["test"]["safe_score"]["value"] for run in card["training_seeds"] if "test" in run]
 
 
 def training_seeds() -> str:

@@ -15,6 +15,7 @@ from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.errors import SettingsError
+from posse_training.leaderboard import SEED
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.train import train
 
@@ -32,7 +33,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
 
 
 def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], tmp_path: Path) -> None:
-    path = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
+    path = ship(Settings(runs, "learned-trial", worlds=10, test_worlds=60, out=tmp_path))
     shipped = LearnedPolicy.from_file(path)
     assert shipped.name == "learned-trial"
     short: dict[str, Any] = {"split": "validation", "horizon": 40, "settle_time": 1.0, "progress": False}
@@ -41,6 +42,10 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], 
         file = str(run / "best.safetensors")
         played = [evaluate(file, "constant", 10, CHOICE_SEED, num_trackers=size, **short) for size in (2, 3)]
         scores.append(sum(each["safe_score"].mean() for each in played) / 2)
+    tested = [evaluate(file, "constant", 60, SEED, num_trackers=size, **{**short, "split": "test"}) for size in (2, 3)]
+    free = sum(each["contact_free"].mean() for each in tested) / 2
+    assert 0 < free < 1
+    assert shipped.card["training_seeds"][-1]["test"]["contact_free"]["value"] == pytest.approx(free)
     recorded = [run["safe_score"]["value"] for run in shipped.card["training_seeds"]]
     assert recorded == pytest.approx(scores)
     assert shipped.card["validation_safe_score"] == pytest.approx(max(scores))
