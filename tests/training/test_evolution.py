@@ -1,4 +1,4 @@
-"""Evolution of a correction: it begins as the script, resumes exactly, and treats a mirrored world as the world."""
+"""Evolution: a correction begins as the script; it resumes exactly, and treats a mirrored world as the world."""
 
 import csv
 import json
@@ -30,6 +30,7 @@ EVOLVED: dict[str, Any] = {
     "steps": 6000,
     "evaluate_every": 2560,
 }
+NOTHING: dict[str, Any] = {**EVOLVED, "advise": None, "encoding": "slots", "safeguard": True}
 
 
 def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
@@ -59,26 +60,30 @@ def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -
         resume(tmp_path / "cut")
 
 
-def test_a_mirrored_world_is_corrected_as_the_world(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("how", "start"), [(EVOLVED, "ddcs-tuned"), (NOTHING, "idle")])
+def test_a_mirrored_world_is_played_as_the_world(tmp_path: Path, how: dict[str, Any], start: str) -> None:
     """Three trackers and a target, and the same with every y and every heading turned round."""
-    train(small(tmp_path, "cmaes", **{**EVOLVED, "steps": 1280}), console=quiet())
+    train(small(tmp_path, "cmaes", **{**how, "steps": 1280}), console=quiet())
     policy: Any = load(tmp_path / "last.safetensors")
-    script, actions = load("ddcs-tuned"), {}
+    begun, actions = load(start), {}
     for side in (1.0, -1.0):
         batch = posse.batch("constant", 1, num_trackers=3, message_size=policy.message_size)
         poses = np.array([[[1.0, 2.0, 0.3], [-3.0, 1.0, -0.4], [2.0, -3.0, 1.0]]]) * (1.0, side, side)
         observations = batch.reset(options={"tracker_pose": poses, "target_pose": [[4.0, side, 0.5 * side]]})
-        for team in (policy, script):
+        for team in (policy, begun):
             actions[team.name, side] = team.act(observations, begin(team, batch))[0][0, :, :2]
     there, mirrored = actions[policy.name, 1.0], actions[policy.name, -1.0]
-    assert np.abs(there - actions[script.name, 1.0]).max() > 0.01, "it corrects"
+    assert np.abs(there - actions[begun.name, 1.0]).max() > 0.01, "it has learned"
     np.testing.assert_allclose(mirrored, there * (1.0, -1.0), rtol=1e-3, atol=1e-3)
 
 
-def test_its_defaults_correct_the_tuned_script() -> None:
-    found = default_settings("robots", "cmaes")
-    assert (found.advise, found.encoding, found.safeguard) == ("ddcs-tuned", "belief", False)
-    assert found == default_settings("robots", preset="residual")
+def test_its_preset_says_whether_it_corrects_the_tuned_script() -> None:
+    found = [default_settings("robots", "cmaes", preset=preset) for preset in ("residual", "nothing")]
+    assert [(s.advise, s.encoding, s.safeguard) for s in found] == [
+        ("ddcs-tuned", "belief", False),
+        (None, "slots", True),
+    ]
+    assert found[0] == default_settings("robots", preset="residual")
 
 
 def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:

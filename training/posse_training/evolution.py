@@ -1,8 +1,9 @@
-"""``--algorithm cmaes``: a linear correction of a script, found by CMA-ES over whole episodes.
+"""``--algorithm cmaes``: a linear policy, or a linear correction of a script, found by CMA-ES over whole episodes.
 
-Where a script is near its best, the noise that exploration adds to each action hides what a correction gains. Here a
-candidate keeps its weights for whole episodes, all candidates of a generation play the same worlds, and what counts is
-the safe score itself. Reference: Hansen, The CMA Evolution Strategy, 2016.
+Where a script is near its best, the noise that exploration adds to each action hides what a correction gains; where one
+robot must leave its slot for the others' sake, no robot finds that out alone. Here a candidate keeps its weights for
+whole episodes, all candidates of a generation play the same worlds, and what counts is the team's safe score itself.
+Reference: Hansen, The CMA Evolution Strategy, 2016.
 
 The mirror image of a world is a world. The output ahead therefore reads only inputs that keep their sign in a mirror,
 and the output to the left only those that change it.
@@ -45,14 +46,14 @@ _TURNS: Final = ("turn_rate", "law_turn", "frame_rate")
 
 
 def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads: int | None = None) -> Path:
-    """Search the weights of a correction, or resume that; return the file of the best mean on validation worlds.
+    """Search the weights, or resume that; return the file of the best mean on validation worlds.
 
     The run folder holds the scores of all candidates: the search follows from its seed and these.
     """
     require("training", "cmaes")
     from cmaes import CMA
 
-    s, basis = settings, _basis(Encoding(settings.encoding, 0, ()))
+    s, basis = settings, _basis(Encoding(settings.encoding, 0, ()), advised=settings.advise is not None)
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
@@ -101,19 +102,21 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     return folder / BEST
 
 
-def adviser_of(settings: TrainSettings) -> Policy:
-    """Return the script that a run corrects.
+def adviser_of(settings: TrainSettings) -> Policy | None:
+    """Return the script that a run corrects, if any.
 
     Raises:
         PolicyError: A policy that cannot be an adviser.
     """
-    adviser = load(str(settings.advise))
+    if settings.advise is None:
+        return None
+    adviser = load(settings.advise)
     check_adviser(adviser, believes=settings.encoding == "belief")
     return adviser
 
 
 class Candidates(LearnedPolicy):
-    """C corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
+    """C policies or corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
 
     Args:
         settings: Of the run.
@@ -125,7 +128,8 @@ class Candidates(LearnedPolicy):
         self._settings, self._weights = settings, weights
         zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
         network = Network(zeros, ones, LIMIT, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
-        super().__init__(network, Encoding(settings.encoding, 0, ()), card, adviser_of(settings))
+        encoding = Encoding(settings.encoding, 0, ())
+        super().__init__(network, encoding, card, adviser_of(settings), settings.safeguard)
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         if len(self._weights) == 1:
@@ -149,9 +153,9 @@ class Candidates(LearnedPolicy):
         return list(map(float, np.concatenate(played, axis=1).mean(axis=1)))
 
 
-def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:
+def _basis(encoding: Encoding, *, advised: bool) -> npt.NDArray[np.float32]:
     """Return patterns (P, MOTION, inputs): their sum, weighted by a point's P numbers, is a network's weights."""
-    images = list(_images(encoding))
+    images = list(_images(encoding, advised))
     basis = []
     for column, (image, sign) in enumerate(images):
         for output in range(MOTION):
@@ -163,11 +167,12 @@ def _basis(encoding: Encoding) -> npt.NDArray[np.float32]:
     return np.array(basis)
 
 
-def _images(encoding: Encoding) -> Iterator[tuple[int, int]]:
+def _images(encoding: Encoding, advised: bool) -> Iterator[tuple[int, int]]:
     """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
     if encoding.with_features:
         yield from _mirrored(FEATURES, 0)
-    yield from ((encoding.size, 1), (encoding.size + 1, -1))
+    if advised:
+        yield from ((encoding.size, 1), (encoding.size + 1, -1))
     if encoding.believes:
         yield from _mirrored(BELIEF, encoding.size + MOTION)
 

@@ -172,13 +172,19 @@ def check_algorithm(settings: TrainSettings) -> None:
             f"algorithm={name!r} does not go with side='target', which observes all and corrects no script: use ppo"
         )
     if kind is None:
-        if settings.advise is None:
-            raise SettingsError(f"algorithm={name!r} corrects a script: set advise, for example to ddcs-tuned")
-        for other in ("start", "imitate", "message_size", "safeguard", "wandb"):
+        if settings.advise is None and settings.encoding == "plain":
+            raise SettingsError(
+                f"encoding='plain' leaves {name} nothing to read: use slots, or name a script to advise"
+            )
+        if settings.advise is not None and settings.safeguard:
+            raise SettingsError(
+                f"safeguard=True does not go with advise={settings.advise!r}, which has one: leave it out"
+            )
+        for other in ("start", "imitate", "message_size", "wandb"):
             if value := getattr(settings, other):
                 raise SettingsError(
-                    f"{other}={value!r} does not go with {name}, whose team begins as its adviser, which safeguards "
-                    "and sends messages: leave it out"
+                    f"{other}={value!r} does not go with {name}, whose team begins with weights of zero and adds no "
+                    "messages: leave it out"
                 )
     elif settings.advise is not None:
         raise SettingsError(
