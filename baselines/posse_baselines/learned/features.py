@@ -26,6 +26,8 @@ _FAR: Final = np.float32(3.0)  # m
 _GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
+_SILENT: Final = np.float32(1.0)  # s; a robot that none has heard for longer is taken for broken
+_LAST: Final = 4096  # above all numbers
 _BIT: Final = np.uint64(1)
 
 MOST: Final = 16
@@ -59,6 +61,7 @@ NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 
 TEAM: Final = record_type(
     ("count", np.int64),
+    ("broken", np.int64),
     ("places", _C, (MOST,)),  # m
     ("numbers", np.int64, (MOST,)),
     ("slots", np.int64, (MOST,)),  # -1: none left
@@ -88,11 +91,12 @@ def write_features(
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
-    for s in range(len(slots)):
+    count, places = team.count - team.broken, len(slots) - team.broken  # the last slots stay empty
+    for s in range(places):
         place = _place_of(slots[s], target, frame)
-        for j in range(team.count):
+        for j in range(count):
             ways[s, j] = length(team.places[j] - place)
-    match_slots(team.count, len(slots), ways, team.slots)
+    match_slots(count, places, ways, team.slots)
     slot = slots[max(team.slots[me], 0)]
     way = _place_of(slot, target, frame)
     d = length(way)
@@ -105,11 +109,11 @@ def write_features(
     out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
     out.law_turn = max(-ONE, min(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], ONE))
     held = 0
-    for j in range(team.count):
+    for j in range(count):
         s = team.slots[j]
         if s >= 0 and j != me:
             held += ways[s, j] < _NEAR
-    out.held = held / max(team.count - 1, 1)
+    out.held = held / max(count - 1, 1)
     out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
 
 
@@ -129,8 +133,11 @@ def _place_of(slot: complex, target: complex, frame: complex) -> complex:
 
 @compiled
 def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
-    """Write the present positions of the known team, own robot first."""
-    team.places[0], team.numbers[0], team.count = 0j, int(row[f.number]), 1
+    """Write the present positions of the known team, own robot first; broken ones get the highest numbers.
+
+    A robot that has been silent for a while is taken for broken.
+    """
+    team.places[0], team.numbers[0], team.count, team.broken = 0j, int(row[f.number]), 1, 0
     for p in range(f.neighbours):
         place = p * f.stride
         number = int(row[f.neighbour_number + place])
@@ -138,7 +145,9 @@ def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
             run = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], _OLDEST)
             way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
             team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
-            team.numbers[team.count] = number
+            broken = row[f.neighbour_age + place] > _SILENT
+            team.numbers[team.count] = number + _LAST * broken
+            team.broken += broken
             team.count += 1
 
 
