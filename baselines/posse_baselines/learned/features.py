@@ -26,7 +26,7 @@ _FAR: Final = np.float32(3.0)  # m
 _GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
-_SILENT: Final = np.float32(1.0)  # s; a robot that none has heard for longer is taken for broken
+_SILENT: Final = np.float32(1.0)  # s; a robot that is not heard for longer is taken for broken
 _LAST: Final = 4096  # above all numbers
 _BIT: Final = np.uint64(1)
 
