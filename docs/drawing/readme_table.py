@@ -11,6 +11,9 @@ from typing import Final
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "hooks"))
 
+import numpy as np
+from scipy import stats
+
 import standings
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import shipped
@@ -58,8 +61,14 @@ def _cell(found: dict[str, Standing], policy: str) -> str:
         beside = standings.tuned_beside(row.scenario, row.worlds, row.seed)
         return f"{score}<br>gain&nbsp;{row.safe_score - beside:+.3f}"
     seeds = standings.test_scores(row)
-    means = f"<br>{len(seeds)} seeds: {sum(seeds) / len(seeds):.3f}" if len(seeds) > 1 else ""
+    means = f"<br>{len(seeds)}&nbsp;seeds&nbsp;{_over_seeds(seeds)}" if len(seeds) > 1 else ""
     return score if policy == BASELINE else f"{score}<br>`{policy}`{means}"
+
+
+def _over_seeds(scores: list[float]) -> str:
+    """Return the mean of training seeds with half its 95 % interval, by Student's t."""
+    low, high = stats.t.interval(0.95, len(scores) - 1, np.mean(scores), stats.sem(scores))
+    return f"{np.mean(scores):.3f}&nbsp;±&nbsp;{(high - low) / 2:.3f}"
 
 
 def with_table(text: str) -> str:
