@@ -65,6 +65,7 @@ def test_a_mirrored_world_is_played_as_the_world(tmp_path: Path, how: dict[str, 
     """Three trackers and a target, and the same with every y and every heading turned round."""
     train(small(tmp_path, "cmaes", **{**how, "steps": 1280}), console=quiet())
     policy: Any = load(tmp_path / "last.safetensors")
+    assert policy.safeguard == (how is NOTHING)
     begun, actions = load(start), {}
     for side in (1.0, -1.0):
         batch = posse.batch("constant", 1, num_trackers=3, message_size=policy.message_size)
