@@ -29,19 +29,17 @@ def default_settings(
         SettingsError: An unknown algorithm, or a correction by another than cmaes.
     """
     algorithm = algorithm or (EVOLUTION if preset == "residual" else "ppo")
-    learns: str = preset
     if preset == "residual" and algorithm != EVOLUTION:
         raise SettingsError(f"preset='residual' goes with cmaes, not {algorithm}: leave one of them out")
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
-        learns = "target"
     tables: tuple[str, ...] = ("all", algorithm)
     if algorithm != EVOLUTION:
         tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
-    for name in ("every", learns):
+    for name in ("every", "target" if side == "target" else preset):
         for table in tables:
             values.update(defaults[name].get(table, {}))
     return TrainSettings.from_dict(values)

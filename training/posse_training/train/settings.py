@@ -47,7 +47,7 @@ class TrainSettings:
     """Scenario to train on, or several (in Python one text with commas)."""
     algorithm: str = "ppo"
     """ppo, mappo (ppo with a value function that reads the state of the world), sac, td3, or cmaes (evolution of a
-    linear correction of a script)."""
+    linear policy, or of a linear correction of a script)."""
     steps: int = number(20_000_000, "", 1, 10**12)
     """Steps to train for, at least; rollouts are completed."""
     seed: int = number(1, "", 0, 2**32 - 1)
