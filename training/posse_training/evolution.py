@@ -1,8 +1,8 @@
 """``--algorithm cmaes``: a linear policy, or a linear correction of a script, found by CMA-ES over whole episodes.
 
-Where a script is near its best, the noise that exploration adds to each action hides what a correction gains; where one
-robot must leave its slot for the others' sake, no robot finds that out alone. Here a candidate keeps its weights for
-whole episodes, all candidates of a generation play the same worlds, and what counts is the team's safe score itself.
+Noise that exploration adds to each action hides what a correction gains where a script is near its best, and does not
+find what costs a robot its slot for seconds before the team gains. Here a candidate keeps its weights for whole
+episodes, all candidates of a generation play the same worlds, and what counts is the team's safe score itself.
 Reference: Hansen, The CMA Evolution Strategy, 2016.
 
 The mirror image of a world is a world. The output ahead therefore reads only inputs that keep their sign in a mirror,
@@ -53,7 +53,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     require("training", "cmaes")
     from cmaes import CMA
 
-    s, basis = settings, _basis(Encoding(settings.encoding, 0, ()), advised=settings.advise is not None)
+    s, basis = settings, _basis(settings)
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
@@ -153,9 +153,9 @@ class Candidates(LearnedPolicy):
         return list(map(float, np.concatenate(played, axis=1).mean(axis=1)))
 
 
-def _basis(encoding: Encoding, *, advised: bool) -> npt.NDArray[np.float32]:
+def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
     """Return patterns (P, MOTION, inputs): their sum, weighted by a point's P numbers, is a network's weights."""
-    images = list(_images(encoding, advised))
+    images = list(_images(settings))
     basis = []
     for column, (image, sign) in enumerate(images):
         for output in range(MOTION):
@@ -167,11 +167,12 @@ def _basis(encoding: Encoding, *, advised: bool) -> npt.NDArray[np.float32]:
     return np.array(basis)
 
 
-def _images(encoding: Encoding, advised: bool) -> Iterator[tuple[int, int]]:
+def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
     """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
+    encoding = Encoding(settings.encoding, 0, ())
     if encoding.with_features:
         yield from _mirrored(FEATURES, 0)
-    if advised:
+    if settings.advise is not None:
         yield from ((encoding.size, 1), (encoding.size + 1, -1))
     if encoding.believes:
         yield from _mirrored(BELIEF, encoding.size + MOTION)

@@ -27,7 +27,7 @@ _GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _SILENT: Final = np.float32(1.0)  # s; a robot that is not heard for longer is taken for broken
-_LAST: Final = 4096  # above all numbers
+_LAST: Final = 4096  # added to the numbers of broken robots, above all others
 _BIT: Final = np.uint64(1)
 
 MOST: Final = 16
@@ -133,10 +133,7 @@ def _place_of(slot: complex, target: complex, frame: complex) -> complex:
 
 @compiled
 def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
-    """Write the present positions of the known team, own robot first; broken ones get the highest numbers.
-
-    A robot that has been silent for a while is taken for broken.
-    """
+    """Write the present positions of the known team, own robot first; broken ones get the highest numbers."""
     team.places[0], team.numbers[0], team.count, team.broken = 0j, int(row[f.number]), 1, 0
     for p in range(f.neighbours):
         place = p * f.stride

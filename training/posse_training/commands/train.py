@@ -37,7 +37,7 @@ class _Arguments(TrainSettings):
     """Settings of a training, and how often and where it is made."""
 
     preset: Preset = "nothing"
-    """What is learned: a policy from random weights, or by cmaes a correction of a scripted team."""
+    """What is learned: a policy from nothing, or by cmaes a correction of a scripted team."""
     seed: Annotated[int, tyro.conf.Suppress] = 1
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(name="seed")] = (1,)
     """Seed of the worlds, the networks and the exploration; or several for as many runs, in turn, or with --ray at

@@ -169,14 +169,16 @@ def check_algorithm(settings: TrainSettings) -> None:
     kind = None if name == EVOLUTION else algorithm_of(name)
     if settings.side == "target" and (kind is None or kind.reads_state):
         raise SettingsError(
-            f"algorithm={name!r} does not go with side='target', which observes all and corrects no script: use ppo"
+            f"algorithm={name!r} does not go with side='target', which observes all, has no slots and corrects no "
+            "script: use ppo"
         )
     if kind is None:
         if settings.advise is None and settings.encoding == "plain":
             raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use slots, or set advise")
         if settings.advise is not None and settings.safeguard:
             raise SettingsError(
-                f"safeguard=True does not go with advise={settings.advise!r}, which has one: leave it out"
+                f"safeguard=True does not go with advise={settings.advise!r}, which has one: use the preset "
+                "residual, or --no-safeguard"
             )
         for other in ("start", "imitate", "message_size", "wandb"):
             if value := getattr(settings, other):

@@ -22,8 +22,8 @@ def default_settings(
         scenario: A scenario's name, or several separated by commas.
         algorithm: One of the algorithms; default: ppo, of the preset ``"residual"`` cmaes.
         side: What learns; a target learns from nothing, whatever the preset.
-        preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn a correction of
-            a scripted team, which cmaes does and no other algorithm.
+        preset: ``"nothing"``: learn from random weights, or zero, behind the safeguard; ``"residual"``: learn a
+            correction of a scripted team, which cmaes does and no other algorithm.
 
     Raises:
         SettingsError: An unknown algorithm, or a correction by another than cmaes.
@@ -34,9 +34,9 @@ def default_settings(
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "team": "ddcs-distributed"}
-    tables: tuple[str, ...] = ("all", algorithm)
+    tables = ["all", algorithm]
     if algorithm != EVOLUTION:
-        tables = "all", "on-policy" if algorithm_of(algorithm).on_policy else "off-policy", algorithm
+        tables.insert(1, "on-policy" if algorithm_of(algorithm).on_policy else "off-policy")
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
     for name in ("every", "target" if side == "target" else preset):
