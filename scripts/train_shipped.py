@@ -42,6 +42,8 @@ FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "radio": {},
     "leader-loss": EVOLVED,
     "obstacles": EVOLVED,
+    "search": EVOLVED,
+    "field": EVOLVED,
     "duel": DUEL,
 }
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""

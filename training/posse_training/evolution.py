@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -170,8 +171,7 @@ def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
 def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
     """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
     encoding = Encoding(settings.encoding, 0, ())
-    if encoding.with_features:
-        yield from _mirrored(FEATURES, 0)
+    yield from islice(_mirrored(FEATURES, 0), encoding.num_features)
     if settings.advise is not None:
         yield from ((encoding.size, 1), (encoding.size + 1, -1))
     if encoding.believes:

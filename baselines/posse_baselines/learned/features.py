@@ -26,8 +26,10 @@ _FAR: Final = np.float32(3.0)  # m
 _GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
-_SILENT: Final = np.float32(1.0)  # s; a robot that is not heard for longer is taken for broken
+_SILENT: Final = np.float32(0.5)  # s; a robot that is not heard for longer is taken for broken
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
+_SPREAD: Final = np.float32(2.0)  # m²; team-mates at its root are as good a reason to turn as the own heading to go on
+_CLOSE: Final = np.float32(0.5)  # m
 _BIT: Final = np.uint64(1)
 
 MOST: Final = 16
@@ -55,9 +57,12 @@ FEATURES: Final = record_type(
     ("seen", _F),  # 1: the tracker itself detects the target
     ("age", _F),  # of the fix / (t + 1 s)
     ("known", _F),  # 1
+    ("explore", _C),  # direction in which to look for the target; zeros while it is known
 )
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
+EXPLORE: Final = 2
+"""Numbers of the last feature."""
 
 TEAM: Final = record_type(
     ("count", np.int64),
@@ -86,17 +91,19 @@ def write_features(
         out.mates[m, 0] = _soft(team.places[m + 1], ONE)
         out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
     if row[f.target_known] == 0.0:
+        out.explore = _explore(row, f, team)
         return
     velocity, frame = pair(row, f.target_velocity), pair(row, f.target_frame)
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
-    count, places = team.count - team.broken, len(slots) - team.broken  # the last slots stay empty
-    for s in range(places):
+    count = team.count - team.broken
+    for s in range(len(slots)):
         place = _place_of(slots[s], target, frame)
         for j in range(count):
             ways[s, j] = length(team.places[j] - place)
-    match_slots(count, places, ways, team.slots)
+    # With more slots than robots, the first is filled at any rate: from there the target is in sight.
+    match_slots(count, len(slots), ways, team.slots, team.broken > 0)
     slot = slots[max(team.slots[me], 0)]
     way = _place_of(slot, target, frame)
     d = length(way)
@@ -115,6 +122,27 @@ def write_features(
             held += ways[s, j] < _NEAR
     out.held = held / max(count - 1, 1)
     out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
+
+
+@compiled
+def _explore(row: FloatArray, f: Record, team: Record) -> complex:
+    """Return the direction in which a tracker looks for the target: ahead, away from team-mates and from walls."""
+    way = complex(1.0, 0.0)
+    for j in range(1, team.count):
+        d = max(length(team.places[j]), _CLOSE)
+        way -= scaled(team.places[j], _SPREAD / (d * d * d))
+    if row[f.arena] > 0.0:
+        place, height = pair(row, f.position), row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
+        inwards = complex(_inwards(place.real, row[f.arena]), _inwards(place.imag, height))
+        way += inwards * pair(row, f.heading).conjugate()
+    return _soft(way, _SMALL)
+
+
+@compiled
+def _inwards(x: float, side: float) -> float:
+    """Return the push from the wall nearer to ``x``, of two that are ``side`` (m) apart: none from half way to it."""
+    push = min(max(0.5 * (abs(x) - 0.25 * side), 0.0), 1.0)
+    return -push if x > 0.0 else push
 
 
 @compiled
@@ -164,21 +192,24 @@ def _sort_by_number(team: Record) -> int:
 
 
 @compiled
-def match_slots(count: int, num_slots: int, ways: FloatArray, chosen: npt.NDArray[np.int64]) -> None:
+def match_slots(
+    count: int, num_slots: int, ways: FloatArray, chosen: npt.NDArray[np.int64], first: bool = False
+) -> None:
     """Match ``count`` robots to slots; write each robot's slot to ``chosen``, -1 for none left.
 
-    Greedy by distance, then pairwise swaps while one shortens the total distance. Trackers that
-    know of the same robots get the same result. ``ways[s, j]`` is the distance of robot j from slot s, m.
+    Greedy by distance, where that is asked for from the first slot on; then pairwise swaps while one shortens the total
+    distance. Trackers that know of the same robots get the same result. ``ways[s, j]`` is the distance of robot j from
+    slot s, m.
     """
     for j in range(count):
         chosen[j] = -1
     taken = np.uint64(0)
-    for _ in range(min(count, num_slots)):
+    for k in range(min(count, num_slots)):
         best, robot, slot = _LARGE, -1, -1
         for j in range(count):
             if chosen[j] >= 0:
                 continue
-            for s in range(num_slots):
+            for s in range(1 if k == 0 and first else num_slots):
                 if ways[s, j] < best and (taken >> np.uint64(s)) & _BIT == np.uint64(0):
                     best, robot, slot = ways[s, j], j, s
         if robot < 0:

@@ -19,13 +19,14 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, TEAM, write_features
+from posse_baselines.learned.features import EXPLORE, FEATURES, MOST, NUM_FEATURES, TEAM, write_features
 from posse_baselines.policy import PolicyError
 
-KINDS: Final = ("plain", "slots", "belief")
+KINDS: Final = ("plain", "slots", "explore", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
-observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
-(:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's ``size``."""
+observation; ``explore``: the same with a direction to search in; ``belief``: ``slots``, and behind the adviser's
+proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's
+``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
@@ -86,12 +87,12 @@ class Encoding:
     def size(self) -> int:
         """Number of network inputs."""
         read = sum(f.size * (self.neighbours if f.of_neighbour else 1) for f in self.fields)
-        return read + (NUM_FEATURES if self.with_features else 0)
+        return read + self.num_features
 
     @property
-    def with_features(self) -> bool:
-        """Whether derived features precede the observation."""
-        return self.kind != "plain"
+    def num_features(self) -> int:
+        """Number of derived features, which precede the observation."""
+        return {"plain": 0, "explore": NUM_FEATURES}.get(self.kind, NUM_FEATURES - EXPLORE)
 
     @property
     def believes(self) -> bool:
@@ -169,11 +170,11 @@ class Encoder(OwnArrays):
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
-        if self.encoding.with_features:
+        if (count := self.encoding.num_features) > 0:
             features = np.zeros(len(rows), FEATURES)
             # The threads share out rows as if each were a world of one tracker.
             over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
-            out[:, :NUM_FEATURES] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)
+            out[:, :count] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)[:, :count]
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
         read[:, missing] = self._unknown[missing]

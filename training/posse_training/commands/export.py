@@ -13,7 +13,6 @@ import tyro
 
 from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.learned.features import NUM_FEATURES
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_baselines.safeguard import MOTION
 from posse_training.errors import SettingsError, require
@@ -85,7 +84,7 @@ def columns(policy: LearnedPolicy) -> dict[str, list[str]]:
     believed = network.inputs - encoding.size - MOTION if encoding.believes else 0
     output = "correction" if policy.adviser else "wanted_velocity" if policy.safeguard else "action"
     every = {
-        "features": [f"features[{k}]" for k in range(NUM_FEATURES * encoding.with_features)],
+        "features": [f"features[{k}]" for k in range(encoding.num_features)],
         "observation": encoding.names(),
         "proposal": motion if policy.adviser else [],
         "belief": [f"belief[{k}]" for k in range(believed)],

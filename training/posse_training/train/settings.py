@@ -90,7 +90,7 @@ class TrainSettings:
     """The action is a wanted velocity, which the safeguard of the script carries out."""
 
     # The networks
-    encoding: Literal["plain", "slots", "belief"] = "slots"
+    encoding: Literal["plain", "slots", "explore", "belief"] = "slots"
     """Network inputs: the observation; with features computed from it; for cmaes with the adviser's belief, too."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
