@@ -30,7 +30,7 @@ EVOLVED: dict[str, Any] = {
     "steps": 6000,
     "evaluate_every": 2560,
 }
-NOTHING: dict[str, Any] = {**EVOLVED, "advise": None, "encoding": "slots", "safeguard": True}
+NOTHING: dict[str, Any] = {**EVOLVED, "advise": None, "encoding": "explore", "safeguard": True}
 
 
 def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_its_preset_says_whether_it_corrects_the_tuned_script() -> None:
     found = [default_settings("robots", "cmaes", preset=preset) for preset in ("residual", "nothing")]
     assert [(s.advise, s.encoding, s.safeguard) for s in found] == [
         ("ddcs-tuned", "belief", False),
-        (None, "slots", True),
+        (None, "explore", True),
     ]
     assert found[0] == default_settings("robots", preset="residual")
 

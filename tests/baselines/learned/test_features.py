@@ -10,7 +10,8 @@ from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
-from posse_baselines.learned import Encoder, Encoding, Network
+from posse_baselines import rollout
+from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
 
 
@@ -58,9 +59,9 @@ def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     away = np.abs(slots - found[..., None])
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
-    # With a perfect radio all compute the same assignment; a robot that is taken for broken leaves the last slot empty.
+    # With a perfect radio all compute the same assignment, and where one is taken for broken, another has the first slot.
     heard = 4 if silent else 5
-    assert all(sorted(row[:heard]) == list(range(heard)) for row in chosen)
+    assert all(len(set(row[:heard])) == heard and 0 in row[:heard] for row in chosen)
 
 
 def test_nothing_known_of_the_target_is_zeros() -> None:
@@ -69,8 +70,37 @@ def test_nothing_known_of_the_target_is_zeros() -> None:
     unknown = batch.layout.views(observations)["target_known"].reshape(-1) == 0
     assert unknown.any()
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
-    assert not rows[unknown, 14:NUM_FEATURES].any()
+    assert not rows[unknown, 14 : NUM_FEATURES - 2].any()
     assert np.isfinite(rows).all()
+
+
+@pytest.mark.parametrize(
+    ("places", "direction"),
+    [
+        ([(0, 0), (0, 2)], 1 - 0.5j),  # 2 m²/d² away from the other
+        ([(0, -6), (0, -8)], 1 + 0.5j + 0.5j),  # half a metre per metre beyond half way to the wall
+        ([(-9, 4), (-9, -4)], 1 + 1 + 2j / 64),  # 1 at most
+    ],
+)
+def test_explores_ahead_away_from_others_and_from_walls(places: list[tuple[int, int]], direction: complex) -> None:
+    batch = posse.batch("search", num_trackers=2)
+    poses = np.array([[(x, y, 0.0) for x, y in places]])
+    observations = batch.reset(options={"tracker_pose": poses, "target_pose": [[9.0, 9.0, 0.0]]})
+    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
+    found = rows[0, NUM_FEATURES - 2 : NUM_FEATURES] @ [1, 1j]
+    assert found == pytest.approx(direction / abs(direction), rel=1e-4, abs=1e-4)
+
+
+def test_a_team_that_explores_finds_the_target() -> None:
+    """A linear policy that reads nothing but the direction to explore in."""
+    weights = np.zeros((2, NUM_FEATURES), np.float32)
+    weights[0, -2] = weights[1, -1] = 1.0
+    ones, zeros = np.ones(NUM_FEATURES, np.float32), np.zeros(NUM_FEATURES, np.float32)
+    network = Network(zeros, ones, 10.0, (weights,), (zeros[:2],), "tanh", "clip")
+    policy = LearnedPolicy(network, Encoding("explore", 0, ()), {}, safeguard=True)
+    found = rollout(posse.batch("search", 100), policy).metrics["detection_time"]
+    assert np.nanmedian(found) < 8.0
+    assert np.isfinite(found).mean() > 0.97
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
