@@ -43,7 +43,7 @@ FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "leader-loss": EVOLVED,
     "obstacles": EVOLVED,
     "search": EVOLVED,
-    "field": EVOLVED,
+    "field": {**EVOLVED, "steps": 400_000_000},
     "duel": DUEL,
 }
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
