@@ -1,4 +1,4 @@
-"""Features that follow from an observation: the tracker's own slot and the way to it.
+"""Features that follow from an observation: the own slot and the way to it, or where to look for the target.
 
 They contain nothing that the observation lacks; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
@@ -10,7 +10,7 @@ scaled to d / (d + scale), which resolves both centimetres near the slot and ten
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -129,7 +129,7 @@ def _explore(row: FloatArray, f: Record, team: Record) -> complex:
     """Return the direction in which a tracker looks for the target: ahead, away from team-mates and from walls."""
     way = complex(1.0, 0.0)
     for j in range(1, team.count):
-        d = max(length(team.places[j]), _CLOSE)
+        d: Any = max(length(team.places[j]), _CLOSE)
         way -= scaled(team.places[j], _SPREAD / (d * d * d))
     if row[f.arena] > 0.0:
         place, height = pair(row, f.position), row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
