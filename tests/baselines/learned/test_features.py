@@ -59,7 +59,7 @@ def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     away = np.abs(slots - found[..., None])
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
-    # With a perfect radio all compute the same assignment, and where one is taken for broken, another has the first slot.
+    # With a perfect radio all compute the same assignment, and if one seems broken, another has the first slot.
     heard = 4 if silent else 5
     assert all(len(set(row[:heard])) == heard and 0 in row[:heard] for row in chosen)
 
