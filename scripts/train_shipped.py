@@ -41,7 +41,7 @@ FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "smart": {},
     "radio": {},
     "leader-loss": EVOLVED,
-    "obstacles": EVOLVED,
+    "obstacles": {**EVOLVED, "encoding": "slots"},
     "search": EVOLVED,
     "field": {**EVOLVED, "steps": 400_000_000},
     "duel": DUEL,
