@@ -43,7 +43,6 @@ FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "leader-loss": EVOLVED,
     "obstacles": {**EVOLVED, "encoding": "slots"},
     "search": EVOLVED,
-    "field": {**EVOLVED, "steps": 400_000_000},
     "duel": DUEL,
 }
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""

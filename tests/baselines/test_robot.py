@@ -71,6 +71,7 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
             np.testing.assert_allclose(robot.row, observations[0, i], rtol=1e-4, atol=1e-4)
             forward = 2 * command.speed * SCALE / s.tracker_speeds[i] - 1
             told = forward, command.turn_rate / s.tracker_turn_rates[i], *command.message
+            np.testing.assert_allclose(told[2:], actions[0, i, 2:], atol=1e-4)
             alike.append(np.allclose(told, actions[0, i], atol=1e-4))
             said, age = robot.robot.broadcast(), (batch.worlds["step"][0] - t.fix_step) * s.control_step
             assert (said.number, said.message) == (i, command.message)

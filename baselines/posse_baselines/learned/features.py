@@ -28,7 +28,7 @@ _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _SILENT: Final = np.float32(0.75)  # s, between two control steps; a robot silent for longer is taken for broken
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
-_SPREAD: Final = np.float32(2.0)  # m²; team-mates at its root are as good a reason to turn as the own heading to go on
+_SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
 _CLOSE: Final = np.float32(0.5)  # m
 _BIT: Final = np.uint64(1)
 
@@ -197,7 +197,7 @@ def match_slots(
 ) -> None:
     """Match ``count`` robots to slots; write each robot's slot to ``chosen``, -1 for none left.
 
-    Greedy by distance, where that is asked for from the first slot on; then pairwise swaps while one shortens the total
+    Greedy by distance, with ``first`` beginning with the first slot; then pairwise swaps while one shortens the total
     distance. Trackers that know of the same robots get the same result. ``ways[s, j]`` is the distance of robot j from
     slot s, m.
     """
