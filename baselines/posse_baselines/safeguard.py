@@ -1,9 +1,10 @@
 """The script's safeguard as an action layer, which any learner can train behind.
 
 An action becomes a wanted velocity, ahead and to the left of the robot, as shares of its greatest speed. The layer
-makes it safe and carries it out as speed and turn rate; the message behind it passes unchanged. Of the script only
-the monitoring of the surroundings and the safeguard run, with the settings that ``ddcs-tuned`` has for the scenario:
-without a wanted velocity a robot stays where it is, but for what it evades.
+turns it past what stands in its way, makes it safe and carries it out as speed and turn rate; the message behind it
+passes unchanged. Of the script only the monitoring of the surroundings, the detours and the safeguard run, with the
+settings that ``ddcs-tuned`` has for the scenario: without a wanted velocity a robot stays where it is, but for what it
+evades.
 
 :func:`Safeguard` puts the layer before an environment, :class:`Guard` is the layer itself, and :class:`Advice` one with
 the whole script, whose velocities a network corrects.

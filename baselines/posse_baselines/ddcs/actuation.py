@@ -19,6 +19,7 @@ import numpy as np
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import mate_now, patience, target_after
+from posse_baselines.ddcs.settings import FLOCKING
 from posse_baselines.laws.geometry import clip, cross, dot, length, scaled, unit, vector
 from posse_baselines.laws.guidance import regulate, write_motion
 from posse_baselines.laws.safeguard import (
@@ -195,11 +196,16 @@ def foresee(team: Team, me: Record) -> None:
 
 
 @compiled
-def execute_safely(team: Team, me: Record, discs: Records, velocity: complex, action: FloatArray) -> None:
-    """Write the command for a velocity (m/s), made safe, into an action: that of the law, if it is the wanted one."""
-    speed, omega, turned = me.wish_speed, me.wish_omega, velocity != me.wish
+def execute_safely(team: Team, me: Record, discs: Records, action: FloatArray) -> None:
+    """Write the command for the wanted velocity, past what stands in its way and made safe, into an action.
+
+    It is the command of the law, if the velocity stays the wanted one.
+    """
+    speed, omega, velocity = me.wish_speed, me.wish_omega, me.wish
+    if team.settings.detour > 0.0 and me.task != FLOCKING:
+        velocity = detour(team, me, discs, velocity)
     velocity, evades = safe_velocity(me, discs, velocity)
-    if turned or evades:
+    if evades or velocity != me.wish:
         speed, omega = regulate(me, velocity, 0.0)
     # Made up for the lag, and remembered until it is executed.
     more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), int(team.world.delay)

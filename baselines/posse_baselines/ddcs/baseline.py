@@ -33,12 +33,12 @@ import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled
-from posse_baselines.ddcs.actuation import correct, detour, execute_safely, foresee, surround
+from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
 from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, read_body, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
-from posse_baselines.ddcs.settings import FLOCKING, NO_EXCHANGE, SEARCHING, Settings
+from posse_baselines.ddcs.settings import NO_EXCHANGE, SEARCHING, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
@@ -209,11 +209,7 @@ def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
 def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
     """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
     correct(me, complex(float(action[0]), float(action[1])))
-    discs = work.discs[: surround(team, me, mates, row, work.discs)]
-    velocity = me.wish
-    if team.settings.detour > 0.0 and me.task != FLOCKING:
-        velocity = detour(team, me, discs, velocity)
-    execute_safely(team, me, discs, velocity, action)
+    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
     write_message(team, me, row, action)
 
 
@@ -228,7 +224,7 @@ def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, a
     wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
     foresee(team, me)
     want(me, wanted, 0.0)
-    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], wanted, action)
+    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
 
 
 propose_all, carry_out_all, guard_all = for_each(propose), for_each(carry_out), for_each(guard)
