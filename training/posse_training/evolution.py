@@ -1,9 +1,10 @@
-"""``--algorithm cmaes``: a linear policy, or a linear correction of a script, found by CMA-ES over whole episodes.
+"""``--algorithm cmaes``: a linear policy, or a linear correction of a script, found by sep-CMA-ES over whole episodes.
 
 Noise that exploration adds to each action hides what a correction gains where a script is near its best, and does not
 find what costs a robot its slot for seconds before the team gains. Here a candidate keeps its weights for whole
 episodes, all candidates of a generation play the same worlds, and what counts is the team's safe score itself.
-Reference: Hansen, The CMA Evolution Strategy, 2016.
+A covariance of the diagonal alone is learned in the few hundred generations that there are. References: Hansen, The CMA
+Evolution Strategy, 2016; Ros and Hansen, A Simple Modification in CMA-ES, 2008.
 
 The mirror image of a world is a world. The output ahead therefore reads only inputs that keep their sign in a mirror,
 and the output to the left only those that change it.
@@ -52,7 +53,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     The run folder holds the scores of all candidates: the search follows from its seed and these.
     """
     require("training", "cmaes")
-    from cmaes import CMA
+    from cmaes import SepCMA
 
     s, basis = settings, _basis(settings)
     hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
@@ -82,7 +83,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
             team([cma.mean], make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
-    cma = CMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
+    cma = SepCMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
     each = s.population * _steps_of(s)  # of a generation
     generations = -(-s.steps // each)
     display.begin(len(scores) * each, generations * each)

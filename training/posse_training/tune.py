@@ -35,7 +35,7 @@ from posse_training.parallel import all_on_ray, connected
 from posse_training.provenance import commit, software
 
 if TYPE_CHECKING:
-    from cmaes import CMA
+    from cmaes import CMA, SepCMA
 
 Point = npt.NDArray[np.float64]
 STATE: Final = "state.json"
@@ -132,7 +132,9 @@ class Space:
         return {t.name: values[t.name] for t in self.tunables if t.name in self.names or values[t.name] != t.default}
 
 
-def advance(cma: CMA, scores: list[list[float]], generation: int, score: Callable[[list[Point]], list[float]]) -> None:
+def advance(
+    cma: CMA | SepCMA, scores: list[list[float]], generation: int, score: Callable[[list[Point]], list[float]]
+) -> None:
     """Advance a search by a generation: one on record is drawn again and takes its scores, a new one is scored."""
     points = [cma.ask() for _ in range(cma.population_size)]
     if generation == len(scores):

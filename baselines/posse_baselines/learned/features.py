@@ -15,9 +15,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, FloatArray, Record, compiled, record_type
+from posse.numeric import ONE, ZERO, FloatArray, Record, compiled, record_type
 from posse_baselines.ddcs.memory import pair
-from posse_baselines.laws.geometry import angle_of, length, scaled
+from posse_baselines.laws.geometry import angle_of, clip, length, scaled, vector
+from posse_baselines.laws.steering import slot_velocity
 
 _SMALL: Final = np.float32(1e-6)
 _LARGE: Final = np.float32(1e9)
@@ -25,6 +26,7 @@ _NEAR: Final = np.float32(0.3)  # m, the default tolerance
 _FAR: Final = np.float32(3.0)  # m
 _GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
+_FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's, which the outermost slot may have
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _SILENT: Final = np.float32(0.75)  # s, between two control steps; a robot silent for longer is taken for broken
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
@@ -76,12 +78,18 @@ TEAM: Final = record_type(
 
 @compiled
 def write_features(
-    row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], team: Record, ways: FloatArray, out: Record
+    row: FloatArray,
+    f: Record,
+    slots: npt.NDArray[np.complex64],
+    turns: bool,
+    team: Record,
+    ways: FloatArray,
+    out: Record,
 ) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
 
-    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame; it works in ``team``, a
-    :data:`TEAM`, and ``ways`` (N, MOST).
+    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame, which goes on turning after
+    the fix if it ``turns``; it works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
     """
     _gather_team(row, f, team)
     top, speed = row[f.max_speed], row[f.speed]
@@ -93,7 +101,11 @@ def write_features(
     if row[f.target_known] == 0.0:
         out.explore = _explore(row, f, team)
         return
-    velocity, frame = pair(row, f.target_velocity), pair(row, f.target_frame)
+    velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
+    rate = ZERO  # of the slot frame, rad/s
+    if turns:
+        turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
+        frame *= vector(ONE, turn)
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
@@ -109,9 +121,9 @@ def write_features(
     d = length(way)
     out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + ONE)
     out.target, out.target_velocity, out.frame, out.slot = _soft(target, ONE), velocity, frame, _soft(slot, _FAR)
-    out.target_heading = pair(row, f.target_heading) * frame.conjugate()
+    out.target_heading = theta * frame.conjugate()
     # The slot law: the slot's velocity plus a velocity towards it, proportional to the distance.
-    wish = velocity + complex(_GAIN * way.real, _GAIN * way.imag)
+    wish = slot_velocity(velocity, rate, slot * frame) + scaled(way, _GAIN)
     wanted = length(wish)
     out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
     out.law_turn = max(-ONE, min(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], ONE))
@@ -122,6 +134,23 @@ def write_features(
             held += ways[s, j] < _NEAR
     out.held = held / max(count - 1, 1)
     out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
+
+
+@compiled
+def _turn_of_frame(
+    row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], behind: np.float32
+) -> tuple[np.float32, np.float32]:
+    """Return by how much the slot frame has turned since the fix (rad), and how fast it turns (rad/s).
+
+    It was ``behind`` the target's heading, to which it turns, at most so fast that the outermost slot is no faster than
+    a tracker.
+    """
+    outermost, v = _SMALL, length(pair(row, f.target_velocity))
+    for s in range(len(slots)):
+        outermost = max(outermost, length(slots[s]))
+    most = max(ZERO, min(_FRAME_SHARE * (row[f.max_speed] - v), v)) / outermost
+    turn = clip(behind, -most * row[f.target_age], most * row[f.target_age])
+    return turn, clip((behind - turn) / row[f.control_step], -most, most)
 
 
 @compiled

@@ -23,8 +23,8 @@ from posse_baselines.learned.features import EXPLORE, FEATURES, MOST, NUM_FEATUR
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots", "explore", "belief")
-"""``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
-observation; ``explore``: the same with a direction to search in; ``belief``: ``slots``, and behind the adviser's
+"""``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the observation; ``explore``:
+the same with slots that go on turning, and a direction to search in; ``belief``: ``slots``, and behind the adviser's
 proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's
 ``size``."""
 MOST_NEIGHBOURS: Final = 4096
@@ -163,7 +163,7 @@ class Encoder(OwnArrays):
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
         # What features are computed in, one of each for a thread.
         work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
-        self._for_features = offsets_of(layout), slots, *work
+        self._for_features = offsets_of(layout), slots, encoding.kind == "explore", *work
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
@@ -183,6 +183,6 @@ class Encoder(OwnArrays):
 
 @kernel
 def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
-    offsets, slots, teams, ways = given
+    offsets, slots, turns, teams, ways = given
     for r in range(first, end):
-        write_features(rows[r], offsets[0], slots, teams[thread], ways[thread], features[r])
+        write_features(rows[r], offsets[0], slots, turns, teams[thread], ways[thread], features[r])
