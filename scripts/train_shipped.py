@@ -41,7 +41,7 @@ FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "smart": {},
     "radio": {},
     "leader-loss": EVOLVED,
-    "obstacles": {**EVOLVED, "encoding": "slots"},
+    "obstacles": EVOLVED,
     "search": EVOLVED,
     "duel": DUEL,
 }

@@ -12,7 +12,7 @@ import posse
 from posse.numeric import FloatArray
 from posse_baselines import rollout
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
-from posse_baselines.learned.features import NUM_FEATURES, match_slots
+from posse_baselines.learned.features import FEATURES, NUM_FEATURES, match_slots
 
 
 def test_names_are_those_of_views() -> None:
@@ -44,6 +44,14 @@ def test_places_that_a_small_team_lacks_are_unknown() -> None:
     assert (named["neighbour_range"][:, 0] > 0).all()
 
 
+def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
+    """The way from each tracker to each slot in its own axes, (E, N, N)."""
+    frame = points(batch, "world", "frame_cos", "frame_sin")
+    places = points(batch, "world")[:, None] + np.array(batch.scenario.slot_offsets) @ [1, 1j] * frame[:, None]
+    ways = (places[:, None] - points(batch, "tracker")[..., None]) / directions(batch, "tracker")[..., None]
+    return np.asarray(ways)
+
+
 @pytest.mark.parametrize("silent", [False, True])
 def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     batch, observations = observations_of("constant", worlds=8, steps=30)
@@ -53,15 +61,37 @@ def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
     soft = rows[:, 14 + 2 : 14 + 4].reshape(8, 5, 2) @ [1, 1j]  # its length is d / (d + 3)
     found = 3.0 * soft / (1 - np.abs(soft))
-    frame = points(batch, "world", "frame_cos", "frame_sin")
-    places = points(batch, "world")[:, None] + np.array(batch.scenario.slot_offsets) @ [1, 1j] * frame[:, None]
-    slots = (places[:, None] - points(batch, "tracker")[..., None]) / directions(batch, "tracker")[..., None]
-    away = np.abs(slots - found[..., None])
+    away = np.abs(ways_to_slots(batch) - found[..., None])
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
     # With a perfect radio all compute the same assignment, and if one seems broken, another has the first slot.
     heard = 4 if silent else 5
     assert all(len(set(row[:heard])) == heard and 0 in row[:heard] for row in chosen)
+
+
+def test_slots_go_on_turning_after_the_fix() -> None:
+    """The slot frame is behind the heading of a target that drives straight on; the robots rest."""
+    batch = posse.batch("constant", 8)
+    batch.reset()
+    frame = points(batch, "world", "heading_cos", "heading_sin") * np.exp(0.5j)
+    batch.arrays.world["frame_cos"], batch.arrays.world["frame_sin"] = frame.real, frame.imag
+    rest = np.zeros(batch.action_shape, np.float32)
+    rest[..., 0] = -1.0
+    for _ in range(2):  # from two fixes follows a velocity
+        observations, *_ = batch.step(rest)
+    for _ in range(15):
+        before = ways_to_slots(batch)
+        batch.step(rest)
+    after = ways_to_slots(batch)
+    batch.layout.views(observations)["target_age"][...] = 15 * batch.scenario.control_step
+    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
+    features = np.ascontiguousarray(rows[:, :NUM_FEATURES]).view(FEATURES).reshape(8, 5)
+    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
+    away = np.abs(after - found[..., None])
+    np.testing.assert_allclose(away.min(axis=2), 0, atol=0.01)
+    mine = np.take_along_axis(np.stack([before, after]), away.argmin(axis=2)[None, ..., None], axis=-1)[..., 0]
+    wish = (mine[1] - mine[0]) / batch.scenario.control_step + 0.8 * mine[1]  # with the law's gain, 1/s
+    np.testing.assert_allclose(features["law_direction"], wish / np.abs(wish), atol=0.01)
 
 
 def test_nothing_known_of_the_target_is_zeros() -> None:
