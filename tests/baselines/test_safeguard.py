@@ -72,15 +72,15 @@ def test_it_keeps_robots_from_each_other_obstacles_and_walls(settings: dict[str,
 
 @pytest.mark.parametrize("aside", [0.0, 0.2, -0.4])
 def test_it_gets_past_a_wide_obstacle(aside: float) -> None:
-    batch = posse.batch("obstacles", 1, num_trackers=1, num_obstacles=1)
+    batch = posse.batch("obstacles", 1, num_trackers=1, num_obstacles=3)
     batch.reset()
-    state = {"tracker": (-3.0, aside), "obstacle": (0.0, 0.0), "world": (0.0, 8.0)}
+    state = {"tracker": (-3.0, aside), "obstacle": (0.0, np.array([-1.0, 0.0, 1.0])), "world": (0.0, 8.0)}
     for name, (x, y) in state.items():
         array = getattr(batch.arrays, name)
         array["x"], array["y"] = x, y
-    batch.arrays.obstacle["radius"] = 0.8
+    batch.arrays.obstacle["radius"] = 0.6
     observations, guard = batch.observe(), Guard(batch.layout, 1)
-    for _ in range(80):
+    for _ in range(120):
         guard.follow(observations)
         towards = np.conj(directions(batch, "tracker"))  # along the x axis
         observations, *_ = batch.step(guard.actions(np.stack([towards.real, towards.imag], axis=-1).astype(np.float32)))
