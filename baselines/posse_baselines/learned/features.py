@@ -81,29 +81,33 @@ def write_features(
     row: FloatArray,
     f: Record,
     slots: npt.NDArray[np.complex64],
-    turns: bool,
+    explores: bool,
     team: Record,
     ways: FloatArray,
     out: Record,
 ) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
 
-    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame, which goes on turning after
-    the fix if it ``turns``; it works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
+    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame. A tracker that ``explores``
+    reads where to look for the target, and slots that go on turning after the fix. It works in ``team``, a
+    :data:`TEAM`, and ``ways`` (N, MOST).
     """
     _gather_team(row, f, team)
     top, speed = row[f.max_speed], row[f.speed]
     out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
+    known = row[f.target_known] > 0.0
+    if explores and not known:
+        out.explore = _explore(row, f, team)  # and nothing that a linear policy would have to weigh for slots, too
+        return
     for m in range(min(team.count - 1, _MATES)):
         place = m * f.stride
         out.mates[m, 0] = _soft(team.places[m + 1], ONE)
         out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
-    if row[f.target_known] == 0.0:
-        out.explore = _explore(row, f, team)
+    if not known:
         return
     velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
     rate = ZERO  # of the slot frame, rad/s
-    if turns:
+    if explores:
         turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
         frame *= vector(ONE, turn)
     target = scaled(pair(row, f.target_bearing), row[f.target_range])

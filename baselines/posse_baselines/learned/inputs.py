@@ -183,6 +183,6 @@ class Encoder(OwnArrays):
 
 @kernel
 def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
-    offsets, slots, turns, teams, ways = given
+    offsets, slots, explores, teams, ways = given
     for r in range(first, end):
-        write_features(rows[r], offsets[0], slots, turns, teams[thread], ways[thread], features[r])
+        write_features(rows[r], offsets[0], slots, explores, teams[thread], ways[thread], features[r])
