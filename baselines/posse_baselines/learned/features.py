@@ -31,6 +31,7 @@ _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long 
 _SILENT: Final = np.float32(0.75)  # s, between two control steps; a robot silent for longer is taken for broken
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
 _SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
+_OUTSIDE: Final = np.float32(20.0)  # m; a slot in a wall counts as so much farther
 _CLOSE: Final = np.float32(0.5)  # m
 _BIT: Final = np.uint64(1)
 
@@ -116,8 +117,9 @@ def write_features(
     count = team.count - team.broken
     for s in range(len(slots)):
         place = _place_of(slots[s], target, frame)
+        more = _OUTSIDE if explores and _is_outside(row, f, place) else ZERO
         for j in range(count):
-            ways[s, j] = length(team.places[j] - place)
+            ways[s, j] = length(team.places[j] - place) + more
     # With more slots than robots, the first is filled at any rate: from there the target is in sight.
     match_slots(count, len(slots), ways, team.slots, team.broken > 0)
     slot = slots[max(team.slots[me], 0)]
@@ -176,6 +178,16 @@ def _inwards(x: float, side: float) -> float:
     """Return the push from the wall nearer to ``x``, of two that are ``side`` (m) apart: none from half way to it."""
     push = min(max(0.5 * (abs(x) - 0.25 * side), 0.0), 1.0)
     return -push if x > 0.0 else push
+
+
+@compiled
+def _is_outside(row: FloatArray, f: Record, place: complex) -> bool:
+    """Return whether a robot at a place would touch a wall."""
+    width, height = row[f.arena], row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
+    if width <= 0.0:
+        return False
+    at, radius = pair(row, f.position) + place * pair(row, f.heading), row[f.robot_radius]
+    return abs(at.real) > 0.5 * width - radius or abs(at.imag) > 0.5 * height - radius
 
 
 @compiled
