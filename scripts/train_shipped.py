@@ -36,13 +36,12 @@ DUEL: Final = {
     "start": str(LEAGUE.path / "generation-06" / "trackers"),
 }
 """Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
-EVOLVED: Final = {"algorithm": "cmaes"}
 FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
     "smart": {},
     "radio": {},
-    "leader-loss": EVOLVED,
-    "obstacles": EVOLVED,
-    "search": EVOLVED,
+    "leader-loss": {},
+    "obstacles": {},
+    "search": {},
     "duel": DUEL,
 }
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
@@ -87,7 +86,7 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"{team}-{seed}"))
         for name, changes in FROM_NOTHING.items():
             if name in settings.scenario and (settings.seed or seed <= 3):
-                learns = default_settings(name, changes.get("algorithm"))
+                learns = default_settings(name)
                 runs.append(replace(learns, **changes, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
 

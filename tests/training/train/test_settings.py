@@ -22,6 +22,20 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("scenario", "side", "algorithm"),
+    [
+        ("search", "trackers", "cmaes"),
+        ("search,field", "trackers", "cmaes"),
+        ("search,smart", "trackers", "ppo"),
+        ("smart", "trackers", "ppo"),
+        ("search", "target", "ppo"),
+    ],
+)
+def test_the_scenario_decides_on_the_algorithm(scenario: str, side: str, algorithm: str) -> None:
+    assert default_settings(scenario, side=side).algorithm == algorithm
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "{",

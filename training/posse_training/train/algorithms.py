@@ -184,7 +184,7 @@ def check_algorithm(settings: TrainSettings) -> None:
             if value := getattr(settings, other):
                 raise SettingsError(
                     f"{other}={value!r} does not go with {name}, whose team begins with weights of zero and adds no "
-                    "messages: leave it out"
+                    "messages: leave it out, or set algorithm to ppo"
                 )
     elif settings.advise is not None:
         raise SettingsError(

@@ -20,7 +20,8 @@ def default_settings(
 
     Args:
         scenario: A scenario's name, or several separated by commas.
-        algorithm: One of the algorithms; default: ppo, of the preset ``"residual"`` cmaes.
+        algorithm: One of the algorithms; default: ppo; cmaes of the preset ``"residual"``, and for teams on scenarios
+            where it learns more.
         side: What learns; a target learns from nothing, whatever the preset.
         preset: ``"nothing"``: learn from random weights, or zero, behind the safeguard; ``"residual"``: learn a
             correction of a scripted team, which cmaes does and no other algorithm.
@@ -28,7 +29,10 @@ def default_settings(
     Raises:
         SettingsError: An unknown algorithm, or a correction by another than cmaes.
     """
-    algorithm = algorithm or (EVOLUTION if preset == "residual" else "ppo")
+    file = resources.files("posse_training.train") / "defaults.toml"
+    defaults = tomllib.loads(file.read_text(encoding="utf-8"))
+    evolves = side == "trackers" and set(scenario.split(",")) <= set(defaults["evolved"])
+    algorithm = algorithm or (EVOLUTION if preset == "residual" or evolves else "ppo")
     if preset == "residual" and algorithm != EVOLUTION:
         raise SettingsError(f"preset='residual' goes with cmaes, not {algorithm}: leave one of them out")
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
@@ -37,8 +41,6 @@ def default_settings(
     tables = ["all", algorithm]
     if algorithm != EVOLUTION:
         tables.insert(1, "on-policy" if algorithm_of(algorithm).on_policy else "off-policy")
-    file = resources.files("posse_training.train") / "defaults.toml"
-    defaults = tomllib.loads(file.read_text(encoding="utf-8"))
     for name in ("every", "target" if side == "target" else preset):
         for table in tables:
             values.update(defaults[name].get(table, {}))
