@@ -10,6 +10,7 @@ scaled to d / (d + scale), which resolves both centimetres near the slot and ten
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -17,14 +18,14 @@ import numpy.typing as npt
 
 from posse.numeric import ONE, ZERO, FloatArray, Record, compiled, record_type
 from posse_baselines.ddcs.memory import pair
-from posse_baselines.laws.geometry import angle_of, clip, length, scaled, vector
+from posse_baselines.laws.geometry import angle_of, clip, length, scaled
 from posse_baselines.laws.steering import slot_velocity
 
 _SMALL: Final = np.float32(1e-6)
 _LARGE: Final = np.float32(1e9)
 _NEAR: Final = np.float32(0.3)  # m, the default tolerance
 _FAR: Final = np.float32(3.0)  # m
-_GAIN: Final = np.float32(0.8)  # 1/s, of the slot law
+_GAIN: Final[Any] = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's, which the outermost slot may have
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
@@ -107,10 +108,10 @@ def write_features(
     if not known:
         return
     velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
-    rate = ZERO  # of the slot frame, rad/s
+    rate: Any = ZERO  # of the slot frame, rad/s
     if explores:
         turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
-        frame *= vector(ONE, turn)
+        frame *= turn
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
@@ -143,20 +144,19 @@ def write_features(
 
 
 @compiled
-def _turn_of_frame(
-    row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], behind: np.float32
-) -> tuple[np.float32, np.float32]:
-    """Return by how much the slot frame has turned since the fix (rad), and how fast it turns (rad/s).
+def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], behind: float) -> tuple[complex, Any]:
+    """Return the turn of the slot frame since the fix, a unit vector, and how fast it turns (rad/s).
 
     It was ``behind`` the target's heading, to which it turns, at most so fast that the outermost slot is no faster than
     a tracker.
     """
-    outermost, v = _SMALL, length(pair(row, f.target_velocity))
+    outermost: Any = _SMALL
+    v: Any = length(pair(row, f.target_velocity))
     for s in range(len(slots)):
         outermost = max(outermost, length(slots[s]))
     most = max(ZERO, min(_FRAME_SHARE * (row[f.max_speed] - v), v)) / outermost
     turn = clip(behind, -most * row[f.target_age], most * row[f.target_age])
-    return turn, clip((behind - turn) / row[f.control_step], -most, most)
+    return complex(math.cos(turn), math.sin(turn)), clip((behind - turn) / row[f.control_step], -most, most)
 
 
 @compiled
@@ -187,7 +187,7 @@ def _is_outside(row: FloatArray, f: Record, place: complex) -> bool:
     if width <= 0.0:
         return False
     at, radius = pair(row, f.position) + place * pair(row, f.heading), row[f.robot_radius]
-    return abs(at.real) > 0.5 * width - radius or abs(at.imag) > 0.5 * height - radius
+    return bool(abs(at.real) > 0.5 * width - radius or abs(at.imag) > 0.5 * height - radius)
 
 
 @compiled

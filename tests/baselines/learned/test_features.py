@@ -52,6 +52,12 @@ def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
     return np.asarray(ways)
 
 
+def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.void]:
+    """The features of the encoding explore, records (E, N)."""
+    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
+    return np.ascontiguousarray(rows[:, :NUM_FEATURES]).view(FEATURES).reshape(observations.shape[:2])
+
+
 @pytest.mark.parametrize("silent", [False, True])
 def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     batch, observations = observations_of("constant", worlds=8, steps=30)
@@ -84,14 +90,30 @@ def test_slots_go_on_turning_after_the_fix() -> None:
         batch.step(rest)
     after = ways_to_slots(batch)
     batch.layout.views(observations)["target_age"][...] = 15 * batch.scenario.control_step
-    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
-    features = np.ascontiguousarray(rows[:, :NUM_FEATURES]).view(FEATURES).reshape(8, 5)
+    features = features_of(batch, observations)
     found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
     away = np.abs(after - found[..., None])
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.01)
     mine = np.take_along_axis(np.stack([before, after]), away.argmin(axis=2)[None, ..., None], axis=-1)[..., 0]
     wish = (mine[1] - mine[0]) / batch.scenario.control_step + 0.8 * mine[1]  # with the law's gain, 1/s
     np.testing.assert_allclose(features["law_direction"], wish / np.abs(wish), atol=0.01)
+
+
+@pytest.mark.parametrize(("side", "inside"), [(1, {0, 1, 2, 4}), (-1, {0, 1, 2, 3})])
+def test_four_robots_leave_the_slot_in_a_wall(side: int, inside: set[int]) -> None:
+    batch = posse.batch("search", start_distance=(1.0, 20.0), target_motion="constant")
+    poses = [(x, side * 9.4, 0.0) for x in (-3.0, -2.4, -1.8, -1.2, -0.6)]  # nearest to that slot
+    batch.reset(options={"tracker_pose": poses, "target_pose": [0.0, side * 8.6, 0.0]})
+    rest = np.zeros(batch.action_shape, np.float32)
+    rest[..., 0] = -1.0
+    observations, *_ = batch.step(rest)
+    views = batch.layout.views(observations)
+    views["neighbour_age"][views["neighbour_number"] == 4] = 1.1
+    features = features_of(batch, observations)[0, :4]
+    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
+    away = np.abs(ways_to_slots(batch)[0, :4] - found[:, None])
+    np.testing.assert_allclose(away.min(axis=1), 0, atol=0.05)
+    assert set(away.argmin(axis=1)) == inside
 
 
 def test_nothing_known_of_the_target_is_zeros() -> None:
