@@ -19,42 +19,25 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-CORRECTIONS: Final = (
-    *("corrected-smart", "corrected-radio", "corrected-leader-loss", "corrected-obstacles", "corrected-field"),
-    *("corrected-search", "learned-robots"),
-)
-"""Teams that correct the script on the scenario of their name."""
+CORRECTIONS: Final = ("smart", "search", "obstacles", "radio", "leader-loss", "field", "robots")
+"""Scenarios with a team that corrects the script, ``corrected-SCENARIO``."""
 LEAGUE: Final = LeagueSettings(
     scenario="duel", generations=6, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
 )
 EVADERS: Final = ("evader", "evader-2", "evader-3")
 """The last targets of three leagues."""
-DUEL: Final = {
+DUEL: Final[dict[str, Any]] = {
     "target": ",".join(("smart", "constant", *OPEN_LOOP, *(each for each in EVADERS for _ in range(3)))),
     "num_worlds": 266,
     "steps": 6_000_000,
     "start": str(LEAGUE.path / "generation-06" / "trackers"),
 }
 """Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
-FROM_NOTHING: Final[dict[str, dict[str, Any]]] = {
-    "smart": {},
-    "radio": {},
-    "leader-loss": {},
-    "obstacles": {},
-    "search": {},
-    "duel": DUEL,
-}
-"""Scenarios with a team that learned from nothing, ``learned-SCENARIO``, and the settings that differ there."""
+FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")
+"""Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SEEDS: Final = {"smart": 5, "field": 5}
 """Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
-
-
-def scenario_of(team: str) -> str:
-    """Return the scenario that a team is named after."""
-    return team.partition("-")[2]
-
-
-SCENARIOS: Final = tuple(dict.fromkeys((*map(scenario_of, CORRECTIONS), *FROM_NOTHING)))
+SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
 """Scenarios with a team of their own."""
 
 
@@ -79,15 +62,13 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             )
     runs = []
     for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
-        for team in CORRECTIONS:
-            name = scenario_of(team)
-            if name in settings.scenario and (settings.seed or seed <= SEEDS.get(name, 3)):
+        for name in settings.scenario:
+            if name in CORRECTIONS and (settings.seed or seed <= SEEDS.get(name, 3)):
                 corrects = default_settings(name, preset="residual")
-                runs.append(replace(corrects, seed=seed, folder=settings.out / f"{team}-{seed}"))
-        for name, changes in FROM_NOTHING.items():
-            if name in settings.scenario and (settings.seed or seed <= 3):
-                learns = default_settings(name)
-                runs.append(replace(learns, **changes, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
+                runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
+            if name in FROM_NOTHING and (settings.seed or seed <= 3):
+                learns = replace(default_settings(name), **(DUEL if name == "duel" else {}))
+                runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
 
 
