@@ -39,7 +39,7 @@ _FIELDS: Final = (
     *("max_speed", "max_turn_rate", "acceleration_time", "turn_acceleration_time"),
     *("target_known", "target_seen", "target_age", "target_range", "target_bearing"),
     *("target_heading", "target_frame", "target_velocity", "sonar"),
-    *("team_size", "arena", "arena_height", "control_step", "robot_radius"),
+    *("arena", "arena_height", "control_step", "robot_radius"),
     *("neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing"),
     *("neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message"),
 )

@@ -167,8 +167,8 @@ def _explore(row: FloatArray, f: Record, team: Record) -> complex:
         d: Any = max(length(team.places[j]), _CLOSE)
         way -= scaled(team.places[j], _SPREAD / (d * d * d))
     if row[f.arena] > 0.0:
-        place, height = pair(row, f.position), row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
-        inwards = complex(_inwards(place.real, row[f.arena]), _inwards(place.imag, height))
+        place = pair(row, f.position)
+        inwards = complex(_inwards(place.real, row[f.arena]), _inwards(place.imag, _height(row, f)))
         way += inwards * pair(row, f.heading).conjugate()
     return _soft(way, _SMALL)
 
@@ -183,11 +183,16 @@ def _inwards(x: float, side: float) -> float:
 @compiled
 def _is_outside(row: FloatArray, f: Record, place: complex) -> bool:
     """Return whether a robot at a place would touch a wall."""
-    width, height = row[f.arena], row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
-    if width <= 0.0:
+    if row[f.arena] <= 0.0:
         return False
     at, radius = pair(row, f.position) + place * pair(row, f.heading), row[f.robot_radius]
-    return bool(abs(at.real) > 0.5 * width - radius or abs(at.imag) > 0.5 * height - radius)
+    return bool(abs(at.real) > 0.5 * row[f.arena] - radius or abs(at.imag) > 0.5 * _height(row, f) - radius)
+
+
+@compiled
+def _height(row: FloatArray, f: Record) -> Any:
+    """Return the height (m) of a walled arena; a square's observation has one side alone."""
+    return row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
 
 
 @compiled
