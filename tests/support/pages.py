@@ -16,16 +16,19 @@ PROGRAMS = ("posse", "make", "python", "pip", "ray")
 SHIPPED = ROOT / "baselines/posse_baselines/shipped"
 FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(r"`((?:posse|make|python) [^`]+)`")
-# Closes every window after half a second, as a reader would some time.
+# Closes every window after half a second, as a reader would some time. The main thread may be importing pygame, or
+# closing its display, at any moment.
 _POSSE = """
 import sys, threading, time
 from posse_training.cli import main
 def close():
     while True:
         time.sleep(0.5)
-        pygame = sys.modules.get("pygame")
-        if pygame and pygame.display.get_init():
+        try:
+            pygame = sys.modules["pygame"]
             pygame.event.post(pygame.event.Event(pygame.QUIT))
+        except (KeyError, AttributeError, pygame.error):
+            pass
 threading.Thread(target=close, daemon=True).start()
 sys.exit(main(sys.argv[1:]))
 """
