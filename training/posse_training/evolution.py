@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -27,7 +26,6 @@ from posse_baselines import Policy, batch_for, load, rollout
 from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.features import FEATURES
 from posse_baselines.safeguard import MOTION, check_adviser
 from posse_training.errors import require
 from posse_training.files import hold_settings, intact
@@ -172,7 +170,7 @@ def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
 def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
     """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
     encoding = Encoding(settings.encoding, 0, ())
-    yield from islice(_mirrored(FEATURES, 0), encoding.num_features)
+    yield from _mirrored(encoding.features, 0)
     if settings.advise is not None:
         yield from ((encoding.size, 1), (encoding.size + 1, -1))
     if encoding.believes:

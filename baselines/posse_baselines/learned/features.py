@@ -1,4 +1,4 @@
-"""Features that follow from an observation: the own slot and the way to it, or where to look for the target.
+"""Features that follow from an observation: the own slot and the way to it, or to where to look for the target.
 
 They contain nothing that the observation lacks; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
@@ -29,7 +29,6 @@ _GAIN: Final[Any] = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's, which the outermost slot may have
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
-_SILENT: Final = np.float32(0.75)  # s, between two control steps; a robot silent for longer is taken for broken
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
 _SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
 _OUTSIDE: Final = np.float32(20.0)  # m; a slot in a wall counts as so much farther
@@ -45,7 +44,7 @@ FEATURES: Final = record_type(
     ("speed", _F),  # share of the greatest
     ("turn_rate", _F),  # share of the greatest
     ("mates", _C, (_MATES, 2)),  # of the nearest ones: the position / (d + 1 m), the velocity less the own one, m/s
-    # zeros while the target is unknown:
+    # zeros while the target is unknown, but for one that explores:
     ("slot_near", _C),  # the way to the own slot / (d + 0.3 m)
     ("slot_far", _C),  # the same / (d + 3 m)
     ("slot_away", _F),  # its length / (d + 1 m)
@@ -61,12 +60,14 @@ FEATURES: Final = record_type(
     ("seen", _F),  # 1: the tracker itself detects the target
     ("age", _F),  # of the fix / (t + 1 s)
     ("known", _F),  # 1
-    ("explore", _C),  # direction in which to look for the target; zeros while it is known
 )
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
-EXPLORE: Final = 2
-"""Numbers of the last feature."""
+EXPLORING: Final = (
+    *("speed", "slot_near", "slot_far", "slot_away", "target", "target_velocity"),
+    *("law_speed", "law_direction", "law_turn", "known"),
+)
+"""Those of a tracker that explores: evolution finds few weights sooner."""
 
 TEAM: Final = record_type(
     ("count", np.int64),
@@ -84,22 +85,27 @@ def write_features(
     f: Record,
     slots: npt.NDArray[np.complex64],
     explores: bool,
+    first: bool,
+    patience: np.float32,
     team: Record,
     ways: FloatArray,
     out: Record,
 ) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
 
-    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame. A tracker that ``explores``
-    reads where to look for the target, and slots that go on turning after the fix. It works in ``team``, a
-    :data:`TEAM`, and ``ways`` (N, MOST).
+    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame. To a tracker that
+    ``explores``, the slot of an unknown target lies where it explores next, and slots go on turning after the fix. A
+    robot silent for longer than the ``patience`` (s) is taken for broken; the ``first`` of more slots than robots is
+    filled at any rate. It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
     """
-    _gather_team(row, f, team)
+    _gather_team(row, f, patience, team)
     top, speed = row[f.max_speed], row[f.speed]
     out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
     known = row[f.target_known] > 0.0
-    if explores and not known:
-        out.explore = _explore(row, f, team)  # and nothing that a linear policy would have to weigh for slots, too
+    if explores and not known:  # as if the own slot were far away in the direction to explore in
+        way = _explore(row, f, team)
+        out.slot_near, out.slot_far, out.slot_away = way, way, ONE
+        out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
     for m in range(min(team.count - 1, _MATES)):
         place = m * f.stride
@@ -110,6 +116,8 @@ def write_features(
     velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
     rate: Any = ZERO  # of the slot frame, rad/s
     if explores:
+        ahead: Any = velocity * theta.conjugate()  # headings are less noisy than velocities, and robots move ahead
+        velocity = scaled(theta, max(ahead.real, ZERO))
         turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
         frame *= turn
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
@@ -121,8 +129,7 @@ def write_features(
         more = _OUTSIDE if explores and _is_outside(row, f, place) else ZERO
         for j in range(count):
             ways[s, j] = length(team.places[j] - place) + more
-    # With more slots than robots, the first is filled at any rate: from there the target is in sight.
-    match_slots(count, len(slots), ways, team.slots, team.broken > 0)
+    match_slots(count, len(slots), ways, team.slots, first and team.broken > 0)
     slot = slots[max(team.slots[me], 0)]
     way = _place_of(slot, target, frame)
     d = length(way)
@@ -133,7 +140,7 @@ def write_features(
     wish = slot_velocity(velocity, rate, slot * frame) + scaled(way, _GAIN)
     wanted = length(wish)
     out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
-    out.law_turn = max(-ONE, min(_TURN_GAIN * angle_of(wish) / row[f.max_turn_rate], ONE))
+    out.law_turn = _turn_to(wish, row, f)
     held = 0
     for j in range(count):
         s = team.slots[j]
@@ -141,6 +148,12 @@ def write_features(
             held += ways[s, j] < _NEAR
     out.held = held / max(count - 1, 1)
     out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
+
+
+@compiled
+def _turn_to(way: complex, row: FloatArray, f: Record) -> Any:
+    """Return the turn rate to a direction, as a share of the greatest."""
+    return max(-ONE, min(_TURN_GAIN * angle_of(way) / row[f.max_turn_rate], ONE))
 
 
 @compiled
@@ -161,7 +174,7 @@ def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64],
 
 @compiled
 def _explore(row: FloatArray, f: Record, team: Record) -> complex:
-    """Return the direction in which a tracker looks for the target: ahead, away from team-mates and from walls."""
+    """Return the direction in which a tracker explores: ahead, away from team-mates and from walls."""
     way = complex(1.0, 0.0)
     for j in range(1, team.count):
         d: Any = max(length(team.places[j]), _CLOSE)
@@ -210,8 +223,11 @@ def _place_of(slot: complex, target: complex, frame: complex) -> complex:
 
 
 @compiled
-def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
-    """Write the present positions of the known team, own robot first; broken ones get the highest numbers."""
+def _gather_team(row: FloatArray, f: Record, patience: np.float32, team: Record) -> None:
+    """Write the present positions of the known team, own robot first.
+
+    Robots silent for longer than the ``patience`` (s) are taken for broken, and get the highest numbers.
+    """
     team.places[0], team.numbers[0], team.count, team.broken = 0j, int(row[f.number]), 1, 0
     for p in range(f.neighbours):
         place = p * f.stride
@@ -220,7 +236,7 @@ def _gather_team(row: FloatArray, f: Record, team: Record) -> None:
             run = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], _OLDEST)
             way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
             team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
-            broken = row[f.neighbour_age + place] > _SILENT
+            broken = row[f.neighbour_age + place] > patience
             team.numbers[team.count] = number + _LAST * broken
             team.broken += broken
             team.count += 1

@@ -15,20 +15,24 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.recfunctions import repack_fields
 
-from posse import ObservationLayout
+from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import EXPLORE, FEATURES, MOST, NUM_FEATURES, TEAM, write_features
+from posse_baselines.learned.features import EXPLORING, FEATURES, MOST, NUM_FEATURES, TEAM, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots", "explore", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the observation; ``explore``:
-the same with slots that go on turning, and a direction to search in; ``belief``: ``slots``, and behind the adviser's
-proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's
-``size``."""
+fewer features, of slots that go on turning, or of where to explore; ``belief``: the observation, and behind the
+adviser's proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the
+encoding's ``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
+_SILENT: Final = 0.75  # s, between two control steps
+_HARDLY: Final = 1e-3  # probability
+_RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
 
 
 class EncodedField(NamedTuple):
@@ -90,9 +94,15 @@ class Encoding:
         return read + self.num_features
 
     @property
+    def features(self) -> np.dtype[Any]:
+        """The derived features, which precede the observation: a part of :data:`FEATURES`, without gaps."""
+        names = {"slots": FEATURES.names or (), "explore": EXPLORING}.get(self.kind, ())
+        return np.dtype(repack_fields(FEATURES[list(names)]))
+
+    @property
     def num_features(self) -> int:
-        """Number of derived features, which precede the observation."""
-        return {"plain": 0, "explore": NUM_FEATURES}.get(self.kind, NUM_FEATURES - EXPLORE)
+        """Number of these."""
+        return self.features.itemsize // 4
 
     @property
     def believes(self) -> bool:
@@ -163,26 +173,43 @@ class Encoder(OwnArrays):
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
         # What features are computed in, one of each for a thread.
         work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
-        self._for_features = offsets_of(layout), slots, encoding.kind == "explore", *work
+        every: Any = FEATURES.fields
+        named = [every[name] for name in encoding.features.names or ()]
+        self._features = np.array([at // 4 + k for kind, at, *_ in named for k in range(kind.itemsize // 4)], np.int64)
+        # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
+        explores = encoding.kind == "explore"
+        first = not explores or bool(np.abs(slots).max() > layout.scenario.sensing_range)
+        patience = np.float32(_patience(layout.scenario) if explores else _SILENT)
+        self._for_features = offsets_of(layout), slots, explores, first, patience, *work
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
-        if (count := self.encoding.num_features) > 0:
+        if (count := len(self._features)) > 0:
             features = np.zeros(len(rows), FEATURES)
             # The threads share out rows as if each were a world of one tracker.
             over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
-            out[:, :count] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)[:, :count]
+            out[:, :count] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)[:, self._features]
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
         read[:, missing] = self._unknown[missing]
         return out
 
 
+def _patience(scenario: Scenario) -> float:
+    """Return the silence (s) after which a robot is taken for broken: it is hardly explained by losses."""
+    if scenario.radio_outages > 0.0:
+        return _RADIO_FAILS
+    lost = math.log(_HARDLY) / math.log(scenario.radio_loss) if scenario.radio_loss > 0.0 else 0.0
+    return (scenario.radio_delay + lost + 1.5) * scenario.control_step
+
+
 @kernel
 def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
-    offsets, slots, explores, teams, ways = given
+    offsets, slots, explores, first_slot, patience, teams, ways = given
     for r in range(first, end):
-        write_features(rows[r], offsets[0], slots, explores, teams[thread], ways[thread], features[r])
+        write_features(
+            rows[r], offsets[0], slots, explores, first_slot, patience, teams[thread], ways[thread], features[r]
+        )

@@ -1,5 +1,7 @@
 """What networks read and answer: encodings by name, features of the state, and the numbers that come out."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -12,7 +14,7 @@ import posse
 from posse.numeric import FloatArray
 from posse_baselines import rollout
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
-from posse_baselines.learned.features import FEATURES, NUM_FEATURES, match_slots
+from posse_baselines.learned.features import match_slots
 
 
 def test_names_are_those_of_views() -> None:
@@ -44,6 +46,13 @@ def test_places_that_a_small_team_lacks_are_unknown() -> None:
     assert (named["neighbour_range"][:, 0] > 0).all()
 
 
+def at_rest(batch: posse.Batch) -> FloatArray:
+    """Actions that stop all robots."""
+    actions = np.zeros(batch.action_shape, np.float32)
+    actions[..., 0] = -1.0
+    return actions
+
+
 def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
     """The way from each tracker to each slot in its own axes, (E, N, N)."""
     frame = points(batch, "world", "frame_cos", "frame_sin")
@@ -54,8 +63,9 @@ def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
 
 def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.void]:
     """The features of the encoding explore, records (E, N)."""
-    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
-    return np.ascontiguousarray(rows[:, :NUM_FEATURES]).view(FEATURES).reshape(observations.shape[:2])
+    encoding = Encoding.of(batch.layout, "explore")
+    rows = Encoder(encoding, batch.layout).encode(observations)[:, : encoding.num_features]
+    return np.ascontiguousarray(rows).view(encoding.features).reshape(observations.shape[:2])
 
 
 @pytest.mark.parametrize("silent", [False, True])
@@ -81,8 +91,7 @@ def test_slots_go_on_turning_after_the_fix() -> None:
     batch.reset()
     frame = points(batch, "world", "heading_cos", "heading_sin") * np.exp(0.5j)
     batch.arrays.world["frame_cos"], batch.arrays.world["frame_sin"] = frame.real, frame.imag
-    rest = np.zeros(batch.action_shape, np.float32)
-    rest[..., 0] = -1.0
+    rest = at_rest(batch)
     for _ in range(2):  # from two fixes follows a velocity
         observations, *_ = batch.step(rest)
     for _ in range(15):
@@ -104,8 +113,7 @@ def test_four_robots_leave_the_slot_in_a_wall(side: int, inside: set[int]) -> No
     batch = posse.batch("search", start_distance=(1.0, 20.0), target_motion="constant")
     poses = [(x, side * 9.4, 0.0) for x in (-3.0, -2.4, -1.8, -1.2, -0.6)]  # nearest to that slot
     batch.reset(options={"tracker_pose": poses, "target_pose": [0.0, side * 8.6, 0.0]})
-    rest = np.zeros(batch.action_shape, np.float32)
-    rest[..., 0] = -1.0
+    rest = at_rest(batch)
     observations, *_ = batch.step(rest)
     views = batch.layout.views(observations)
     views["neighbour_age"][views["neighbour_number"] == 4] = 1.1
@@ -116,13 +124,44 @@ def test_four_robots_leave_the_slot_in_a_wall(side: int, inside: set[int]) -> No
     assert set(away.argmin(axis=1)) == inside
 
 
+def slots_without_the_first_robot(**overrides: Any) -> list[int]:
+    """The slots that robots in the slots 1 to 4 choose, when number 0, far away, has been silent for 1.1 s."""
+    batch = posse.batch("constant", **overrides)
+    places = [(5.0, 0.0), *batch.scenario.slot_offsets[1:]]
+    batch.reset(options={"tracker_pose": [(*p, 0.0) for p in places], "target_pose": [0.0, 0.0, 0.0]})
+    observations, *_ = batch.step(at_rest(batch))
+    views = batch.layout.views(observations)
+    views["neighbour_age"][views["neighbour_number"] == 0] = 1.1
+    features = features_of(batch, observations)[0, 1:]
+    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
+    return [int(k) for k in np.abs(ways_to_slots(batch)[0, 1:] - found[:, None]).argmin(axis=1)]
+
+
+def test_the_first_slot_is_filled_where_the_target_is_not_in_sight_from_all() -> None:
+    assert slots_without_the_first_robot() == [1, 2, 3, 4]
+    assert 0 in slots_without_the_first_robot(sensing_range=3.0)  # the outer slots are 3.4 m away
+    # Where radios fail, silence does not mean that it is broken: its slot stays its own.
+    assert slots_without_the_first_robot(sensing_range=3.0, radio_outages=1e-9) == [1, 2, 3, 4]
+
+
+def test_a_target_moves_along_its_heading() -> None:
+    batch, observations = observations_of("constant", steps=30)
+    before = features_of(batch, observations)
+    views = batch.layout.views(observations)
+    views["target_velocity"] += 0.5 * views["target_heading"][..., ::-1] * [-1, 1]  # across
+    after = features_of(batch, observations)
+    for name in before.dtype.names or ():
+        np.testing.assert_allclose(after[name], before[name], atol=1e-5)
+
+
 def test_nothing_known_of_the_target_is_zeros() -> None:
     batch = posse.batch("search", 4)
     observations = batch.reset()
     unknown = batch.layout.views(observations)["target_known"].reshape(-1) == 0
     assert unknown.any()
-    rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
-    assert not rows[unknown, 14 : NUM_FEATURES - 2].any()
+    encoding = Encoding.of(batch.layout, "slots")
+    rows = Encoder(encoding, batch.layout).encode(observations)
+    assert not rows[unknown, 14 : encoding.num_features].any()
     assert np.isfinite(rows).all()
 
 
@@ -138,18 +177,23 @@ def test_explores_ahead_away_from_others_and_from_walls(places: list[tuple[int, 
     batch = posse.batch("search", num_trackers=2)
     poses = np.array([[(x, y, 0.0) for x, y in places]])
     observations = batch.reset(options={"tracker_pose": poses, "target_pose": [[9.0, 9.0, 0.0]]})
-    rows = Encoder(Encoding.of(batch.layout, "explore"), batch.layout).encode(observations)
-    found = rows[0, NUM_FEATURES - 2 : NUM_FEATURES] @ [1, 1j]
-    assert found == pytest.approx(direction / abs(direction), rel=1e-4, abs=1e-4)
+    features = features_of(batch, observations)[0, 0]
+    assert [features[name] for name in ("slot_near", "slot_far", "law_direction")] == pytest.approx(
+        3 * [direction / abs(direction)], rel=1e-4, abs=1e-4
+    )
+    assert features["law_speed"] == features["slot_away"] == 1
+    assert features["law_turn"] == pytest.approx(np.clip(3 * np.angle(direction) / 1.2, -1, 1), rel=1e-4, abs=1e-4)
 
 
 def test_a_team_that_explores_finds_the_target() -> None:
-    """A linear policy that reads nothing but the direction to explore in."""
-    weights = np.zeros((2, NUM_FEATURES), np.float32)
-    weights[0, -2] = weights[1, -1] = 1.0
-    ones, zeros = np.ones(NUM_FEATURES, np.float32), np.zeros(NUM_FEATURES, np.float32)
+    """A linear policy that reads nothing but the direction to its slot, or to explore in."""
+    encoding = Encoding("explore", 0, ())
+    weights = np.zeros((2, encoding.num_features), np.float32)
+    at = encoding.features.fields["law_direction"][1] // 4  # type: ignore[index]
+    weights[0, at] = weights[1, at + 1] = 1.0
+    ones, zeros = np.ones_like(weights[0]), np.zeros_like(weights[0])
     network = Network(zeros, ones, 10.0, (weights,), (zeros[:2],), "tanh", "clip")
-    policy = LearnedPolicy(network, Encoding("explore", 0, ()), {}, safeguard=True)
+    policy = LearnedPolicy(network, encoding, {}, safeguard=True)
     found = rollout(posse.batch("search", 100), policy).metrics["detection_time"]
     assert np.nanmedian(found) < 8.0
     assert np.isfinite(found).mean() > 0.97
