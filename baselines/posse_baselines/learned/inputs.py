@@ -25,9 +25,9 @@ from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots", "explore", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the observation; ``explore``:
-fewer features, of slots that go on turning, or of where to explore; ``belief``: the observation, and behind the
-adviser's proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the
-encoding's ``size``."""
+fewer features, of slots that go on turning, or of where to explore; ``belief``: ``slots``, and behind the adviser's
+proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's
+``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 _SILENT: Final = 0.75  # s, between two control steps
@@ -96,7 +96,7 @@ class Encoding:
     @property
     def features(self) -> np.dtype[Any]:
         """The derived features, which precede the observation: a part of :data:`FEATURES`, without gaps."""
-        names = {"slots": FEATURES.names or (), "explore": EXPLORING}.get(self.kind, ())
+        names = {"plain": (), "explore": EXPLORING}.get(self.kind, FEATURES.names or ())
         return np.dtype(repack_fields(FEATURES[list(names)]))
 
     @property
