@@ -24,10 +24,10 @@ from posse_training.cli import main
 def close():
     while True:
         time.sleep(0.5)
+        pygame = sys.modules.get("pygame")
         try:
-            pygame = sys.modules["pygame"]
             pygame.event.post(pygame.event.Event(pygame.QUIT))
-        except (KeyError, AttributeError, pygame.error):
+        except (AttributeError, RuntimeError):  # pygame.error is one
             pass
 threading.Thread(target=close, daemon=True).start()
 sys.exit(main(sys.argv[1:]))
