@@ -63,7 +63,7 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
     no_ray = importlib.util.find_spec("ray") is None
     script = script_of(page, [*NOT_RUN, *["--ray"] * no_ray], SHORTER, GIVEN)
     (tmp_path / "page.py").write_text(script, encoding="utf-8")
-    printed("page.py", cwd=tmp_path, seconds=900, BROWSER="true")
+    printed("page.py", cwd=tmp_path, seconds=300, BROWSER="true")
 
 
 @functools.cache
