@@ -11,12 +11,12 @@ scaled to d / (d + scale), which resolves both centimetres near the slot and ten
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, FloatArray, Record, compiled, record_type
+from posse.numeric import ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
 from posse_baselines.laws.geometry import angle_of, clip, length, scaled
 from posse_baselines.laws.steering import slot_velocity
@@ -79,30 +79,34 @@ TEAM: Final = record_type(
 """The robots that a tracker knows of, itself among them, as :func:`write_features` works with them."""
 
 
+class Known(NamedTuple):
+    """What a tracker knows of its scenario."""
+
+    at: Records
+    """Offsets of an observation's fields, an array of one record."""
+    slots: npt.NDArray[np.complex64]
+    """(N,) in the slot frame, m."""
+    explores: bool
+    """Whether the slot of an unknown target lies where the tracker explores next, and slots go on turning after the
+    fix."""
+    first: bool
+    """Whether of more slots than robots the first is filled at any rate."""
+    patience: np.float32
+    """s; a robot silent for longer is taken for broken."""
+
+
 @compiled
-def write_features(
-    row: FloatArray,
-    f: Record,
-    slots: npt.NDArray[np.complex64],
-    explores: bool,
-    first: bool,
-    patience: np.float32,
-    team: Record,
-    ways: FloatArray,
-    out: Record,
-) -> None:
+def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray, out: Record) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
 
-    ``f`` has the offsets of the observation's fields, ``slots`` (N,) are in the slot frame. To a tracker that
-    ``explores``, the slot of an unknown target lies where it explores next, and slots go on turning after the fix. A
-    robot silent for longer than the ``patience`` (s) is taken for broken; the ``first`` of more slots than robots is
-    filled at any rate. It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
+    It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
     """
-    _gather_team(row, f, patience, team)
+    f, slots, explores = known.at[0], known.slots, known.explores
+    _gather_team(row, f, known.patience, team)
     top, speed = row[f.max_speed], row[f.speed]
     out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
-    known = row[f.target_known] > 0.0
-    if explores and not known:  # as if the own slot were far away in the direction to explore in
+    has_fix = row[f.target_known] > 0.0
+    if explores and not has_fix:  # as if the own slot were far away in the direction to explore in
         way = _explore(row, f, team)
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
@@ -111,7 +115,7 @@ def write_features(
         place = m * f.stride
         out.mates[m, 0] = _soft(team.places[m + 1], ONE)
         out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
-    if not known:
+    if not has_fix:
         return
     velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
     rate: Any = ZERO  # of the slot frame, rad/s
@@ -129,7 +133,7 @@ def write_features(
         more = _OUTSIDE if explores and _is_outside(row, f, place) else ZERO
         for j in range(count):
             ways[s, j] = length(team.places[j] - place) + more
-    match_slots(count, len(slots), ways, team.slots, first and team.broken > 0)
+    match_slots(count, len(slots), ways, team.slots, known.first and team.broken > 0)
     slot = slots[max(team.slots[me], 0)]
     way = _place_of(slot, target, frame)
     d = length(way)

@@ -20,7 +20,7 @@ from numpy.lib.recfunctions import repack_fields
 from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import EXPLORING, FEATURES, MOST, NUM_FEATURES, TEAM, write_features
+from posse_baselines.learned.features import EXPLORING, FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots", "explore", "belief")
@@ -180,7 +180,7 @@ class Encoder(OwnArrays):
         explores = encoding.kind == "explore"
         first = not explores or bool(np.abs(slots).max() > layout.scenario.sensing_range)
         patience = np.float32(_patience(layout.scenario) if explores else _SILENT)
-        self._for_features = offsets_of(layout), slots, explores, first, patience, *work
+        self._for_features = Known(offsets_of(layout), slots, explores, first, patience), *work
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
@@ -208,8 +208,6 @@ def _patience(scenario: Scenario) -> float:
 
 @kernel
 def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
-    offsets, slots, explores, first_slot, patience, teams, ways = given
+    known, teams, ways = given
     for r in range(first, end):
-        write_features(
-            rows[r], offsets[0], slots, explores, first_slot, patience, teams[thread], ways[thread], features[r]
-        )
+        write_features(rows[r], known, teams[thread], ways[thread], features[r])
