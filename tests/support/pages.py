@@ -16,8 +16,8 @@ PROGRAMS = ("posse", "make", "python", "pip", "ray")
 SHIPPED = ROOT / "baselines/posse_baselines/shipped"
 FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(r"`((?:posse|make|python) [^`]+)`")
-# Closes every window after half a second, as a reader would some time. The main thread may be importing pygame, or
-# closing its display, at any moment.
+# Closes every window after half a second, as a reader would some time. Pygame may be missing, half imported, or
+# without a window.
 _POSSE = """
 import sys, threading, time
 from posse_training.cli import main

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from posse.numeric import ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
-from posse_baselines.laws.geometry import angle_of, clip, length, scaled
+from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled
 from posse_baselines.laws.steering import slot_velocity
 
 _SMALL: Final = np.float32(1e-6)
@@ -44,7 +44,7 @@ FEATURES: Final = record_type(
     ("speed", _F),  # share of the greatest
     ("turn_rate", _F),  # share of the greatest
     ("mates", _C, (_MATES, 2)),  # of the nearest ones: the position / (d + 1 m), the velocity less the own one, m/s
-    # zeros while the target is unknown, but for one that explores:
+    # zeros while the target is unknown, but slot and law of a tracker that explores:
     ("slot_near", _C),  # the way to the own slot / (d + 0.3 m)
     ("slot_far", _C),  # the same / (d + 3 m)
     ("slot_away", _F),  # its length / (d + 1 m)
@@ -67,7 +67,7 @@ EXPLORING: Final = (
     *("speed", "slot_near", "slot_far", "slot_away", "target", "target_velocity"),
     *("law_speed", "law_direction", "law_turn", "known"),
 )
-"""Those of a tracker that explores: evolution finds few weights sooner."""
+"""The features that a tracker that explores reads: evolution finds few weights sooner."""
 
 TEAM: Final = record_type(
     ("count", np.int64),
@@ -87,8 +87,8 @@ class Known(NamedTuple):
     slots: npt.NDArray[np.complex64]
     """(N,) in the slot frame, m."""
     explores: bool
-    """Whether the slot of an unknown target lies where the tracker explores next, and slots go on turning after the
-    fix."""
+    """Whether an unknown target's slot lies where the tracker explores next, slots go on turning after the fix, those
+    in a wall are filled last, and the target moves along its heading."""
     first: bool
     """Whether of more slots than robots the first is filled at any rate."""
     patience: np.float32
@@ -120,8 +120,8 @@ def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray
     velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
     rate: Any = ZERO  # of the slot frame, rad/s
     if explores:
-        ahead: Any = velocity * theta.conjugate()  # headings are less noisy than velocities, and robots move ahead
-        velocity = scaled(theta, max(ahead.real, ZERO))
+        ahead: Any = dot(velocity, theta)  # robots move along their headings, which are less noisy than velocities
+        velocity = scaled(theta, max(ahead, ZERO))
         turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
         frame *= turn
     target = scaled(pair(row, f.target_bearing), row[f.target_range])

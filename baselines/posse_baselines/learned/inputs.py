@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.recfunctions import repack_fields
 
 from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
@@ -23,11 +22,13 @@ from posse_baselines.ddcs.memory import offsets_of
 from posse_baselines.learned.features import EXPLORING, FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
 from posse_baselines.policy import PolicyError
 
-KINDS: Final = ("plain", "slots", "explore", "belief")
+_READ: Final = {"plain": (), "slots": FEATURES.names or (), "explore": EXPLORING, "belief": FEATURES.names or ()}
+_FEATURES: Final = {kind: np.dtype([(name, FEATURES[name]) for name in names]) for kind, names in _READ.items()}
+KINDS: Final = tuple(_READ)
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the observation; ``explore``:
-fewer features, of slots that go on turning, or of where to explore; ``belief``: ``slots``, and behind the adviser's
-proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of the encoding's
-``size``."""
+the same with fewer features, by which an unknown target's slot lies where to explore next; ``belief``: ``slots``, and
+behind the adviser's proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of
+the encoding's ``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 _SILENT: Final = 0.75  # s, between two control steps
@@ -96,8 +97,7 @@ class Encoding:
     @property
     def features(self) -> np.dtype[Any]:
         """The derived features, which precede the observation: a part of :data:`FEATURES`, without gaps."""
-        names = {"plain": (), "explore": EXPLORING}.get(self.kind, FEATURES.names or ())
-        return np.dtype(repack_fields(FEATURES[list(names)]))
+        return _FEATURES[self.kind]
 
     @property
     def num_features(self) -> int:
@@ -191,7 +191,8 @@ class Encoder(OwnArrays):
             features = np.zeros(len(rows), FEATURES)
             # The threads share out rows as if each were a world of one tracker.
             over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
-            out[:, :count] = features.view(np.float32).reshape(len(rows), NUM_FEATURES)[:, self._features]
+            numbers = features.view(np.float32).reshape(len(rows), NUM_FEATURES)
+            out[:, :count] = np.take(numbers, self._features, axis=1, mode="wrap")
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
         read[:, missing] = self._unknown[missing]
@@ -199,7 +200,7 @@ class Encoder(OwnArrays):
 
 
 def _patience(scenario: Scenario) -> float:
-    """Return the silence (s) after which a robot is taken for broken: it is hardly explained by losses."""
+    """Return the silence (s) after which a robot is taken for broken: losses hardly explain it."""
     if scenario.radio_outages > 0.0:
         return _RADIO_FAILS
     lost = math.log(_HARDLY) / math.log(scenario.radio_loss) if scenario.radio_loss > 0.0 else 0.0

@@ -91,8 +91,8 @@ class TrainSettings:
 
     # The networks
     encoding: Literal["plain", "slots", "explore", "belief"] = "slots"
-    """Network inputs: the observation; with features computed from it; with slots that go on turning and a direction to
-    explore in, too; or for corrections with the adviser's belief."""
+    """Network inputs: the observation; with features computed from it; with fewer, for evolution; or for corrections
+    with the adviser's belief."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
