@@ -85,23 +85,23 @@ class Guard(OwnArrays):
         return {"observed": self._observed, "inputs": self.inputs, **self.minds.arrays()}
 
 
-def check_adviser(policy: Policy | None, *, believes: bool) -> int:
+def check_adviser(policy: Policy | None) -> int:
     """Return how many numbers a network reads in addition to its encoding, with an adviser or without.
 
-    PolicyError if the adviser is not a policy of the DDCS, or if a belief is to be read without an adviser.
+    PolicyError if the adviser is not a policy of the DDCS.
     """
-    if policy is None and believes:
-        raise PolicyError("a policy that reads an adviser's belief needs an adviser")
-    if policy is not None and not isinstance(policy, DDCS):
+    if policy is None:
+        return 0
+    if not isinstance(policy, DDCS):
         raise PolicyError(f"{policy.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
-    return 0 if policy is None else MOTION + (BELIEF_SIZE if believes else 0)
+    return MOTION + BELIEF_SIZE
 
 
 class Advice(Guard):
     """The safeguard of a scripted adviser, which carries out the velocities of the script as a network corrects them.
 
     Residual policy learning: at each step the adviser, a team of the DDCS, proposes the velocity that it wants, the
-    network reads the proposal together with the observation, and twice its output is added to the proposal, before the
+    network reads the proposal and what the adviser believes, and twice its output is added to the proposal, before the
     safeguard. An output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are
     sent unchanged, and its memory is its own, so the network needs no memory. References: Silver et al. 2018, Johannink
     et al. 2019; Alshiekh et al. 2018 (safeguard).
@@ -110,22 +110,20 @@ class Advice(Guard):
         adviser: A policy of the DDCS.
         layout: Of the observations.
         num_worlds: E; their episodes may begin apart.
-        believes: Whether the network reads the adviser's belief.
     """
 
-    def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int, *, believes: bool = False) -> None:
-        size = check_adviser(adviser, believes=believes)
+    def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int) -> None:
+        size = check_adviser(adviser)
         super().__init__(layout, num_worlds, minds=adviser.begin(layout, num_worlds))
         self.inputs = np.zeros((*self.minds.me.shape, size), np.float32)
-        self._adviser, self._believes = adviser, believes
+        self._adviser = adviser
 
     def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
         """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
         kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
         super().follow(observations)
         self.inputs[..., :MOTION], _ = self._adviser.propose(self._observed, self.minds)
-        if self._believes:
-            self.inputs[..., MOTION:] = beliefs_of(self.minds, self._observed)
+        self.inputs[..., MOTION:] = beliefs_of(self.minds, self._observed)
         for name, array in self.arrays().items():
             if mask is not None:
                 array[~mask] = kept[name]

@@ -18,7 +18,7 @@ from posse_baselines.safeguard import Guard
 
 def guarded(scenario: str, **changes: Any) -> LearnedPolicy:
     """A policy behind the safeguard whose untrained network gives small numbers."""
-    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario(scenario)), "slots")
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario(scenario)), "features")
     network = network_for(encoding.size, **changes)
     small = tuple(np.float32(1e-3) * weight for weight in network.weights)
     network = type(network)(**{**vars(network), "weights": small})

@@ -48,7 +48,7 @@ def test_discrete_actions_and_absent_messages_are_played() -> None:
 @pytest.mark.parametrize("safeguard", [False, True])
 def test_encoded_observations_are_played(safeguard: bool) -> None:
     batch = posse.batch("constant", 2, autoreset="disabled")
-    encoding = Encoding.of(batch.layout, "slots", neighbours=2)
+    encoding = Encoding.of(batch.layout, "features", neighbours=2)
     env = TeamVecEnv([batch], encoding, safeguard=safeguard)
     model = PPO("MlpPolicy", env, n_steps=8, batch_size=80, device="cpu")
     observations, actions = acted(from_sb3(model, encoding=encoding, safeguard=safeguard), num_trackers=4)

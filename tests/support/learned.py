@@ -30,7 +30,7 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
     return replace(network, **changes)
 
 
-def policy_for(layout: posse.ObservationLayout, kind: str = "slots", **changes: Any) -> LearnedPolicy:
+def policy_for(layout: posse.ObservationLayout, kind: str = "features", **changes: Any) -> LearnedPolicy:
     encoding = Encoding.of(layout, kind)
     return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 

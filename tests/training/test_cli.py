@@ -122,7 +122,7 @@ INVALID = {
     "train --side target --team nobody": "unknown policy 'nobody'",
     "train --side target --team planner": "cannot be trained against",
     "train --side target --beside evadr": "unknown target 'evadr'",
-    "train --side target --encoding slots": "encoding='slots'",
+    "train --side target --encoding features": "encoding='features'",
     "train --side target --message-size 2": "message_size=2",
     "train --side target --set target_motion=agent": "the setting target",
     "train --side target --reward-weights slot=1.0": "unknown term of a target 'slot'",

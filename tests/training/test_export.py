@@ -62,7 +62,7 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
     activation: str, output: str, safeguard: bool, tmp_path: Path
 ) -> None:
     batch, observations = observations_of("smart", message_size=2)
-    encoding = Encoding.of(batch.layout, "slots")
+    encoding = Encoding.of(batch.layout, "features")
     network = network_for(encoding.size, 4, activation=activation, output=output)
     policy = LearnedPolicy(network, encoding, {}, safeguard=safeguard)
     wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))

@@ -111,7 +111,7 @@ def adviser_of(settings: TrainSettings) -> Policy | None:
     if settings.advise is None:
         return None
     adviser = load(settings.advise)
-    check_adviser(adviser, believes=settings.encoding == "belief")
+    check_adviser(adviser)
     return adviser
 
 
@@ -173,7 +173,6 @@ def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
     yield from _mirrored(encoding.features, 0)
     if settings.advise is not None:
         yield from ((encoding.size, 1), (encoding.size + 1, -1))
-    if encoding.believes:
         yield from _mirrored(BELIEF, encoding.size + MOTION)
 
 

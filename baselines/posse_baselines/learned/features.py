@@ -63,11 +63,11 @@ FEATURES: Final = record_type(
 )
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
-EXPLORING: Final = (
+READ: Final = (
     *("speed", "slot_near", "slot_far", "slot_away", "target", "target_velocity"),
     *("law_speed", "law_direction", "law_turn", "known"),
 )
-"""The features that a tracker that explores reads: evolution finds few weights sooner."""
+"""The features that a tracker that explores reads: few weights are learned sooner."""
 
 TEAM: Final = record_type(
     ("count", np.int64),

@@ -19,16 +19,14 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import EXPLORING, FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
+from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, READ, TEAM, Known, write_features
 from posse_baselines.policy import PolicyError
 
-_READ: Final = {"plain": (), "slots": FEATURES.names or (), "explore": EXPLORING, "belief": FEATURES.names or ()}
+_READ: Final = {"plain": (), "features": READ, "slots": FEATURES.names or ()}
 _FEATURES: Final = {kind: np.dtype([(name, FEATURES[name]) for name in names]) for kind, names in _READ.items()}
 KINDS: Final = tuple(_READ)
-"""``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the observation; ``explore``:
-the same with fewer features, by which an unknown target's slot lies where to explore next; ``belief``: ``slots``, and
-behind the adviser's proposal what the adviser believes (:class:`posse_baselines.safeguard.Advice`), which is no part of
-the encoding's ``size``."""
+"""``plain``: the observation; ``features``: :mod:`posse_baselines.learned.features`, then the observation; ``slots``:
+the same with more features, for a tracker that does not explore."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 _SILENT: Final = 0.75  # s, between two control steps
@@ -104,11 +102,6 @@ class Encoding:
         """Number of these."""
         return self.features.itemsize // 4
 
-    @property
-    def believes(self) -> bool:
-        """Whether the network also reads the adviser's belief."""
-        return self.kind == "belief"
-
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
         """Return the encoding of the values that ``dataclasses.asdict`` gives."""
@@ -177,7 +170,7 @@ class Encoder(OwnArrays):
         named = [every[name] for name in encoding.features.names or ()]
         self._features = np.array([at // 4 + k for kind, at, *_ in named for k in range(kind.itemsize // 4)], np.int64)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
-        explores = encoding.kind == "explore"
+        explores = encoding.kind == "features"
         first = not explores or bool(np.abs(slots).max() > layout.scenario.sensing_range)
         patience = np.float32(_patience(layout.scenario) if explores else _SILENT)
         self._for_features = Known(offsets_of(layout), slots, explores, first, patience), *work

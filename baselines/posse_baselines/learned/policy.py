@@ -75,7 +75,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Policy | None = None,
         safeguard: bool = False,
     ) -> None:
-        size = encoding.size + check_adviser(adviser, believes=encoding.believes)
+        size = encoding.size + check_adviser(adviser)
         most = MOTION if adviser is not None else network.outputs  # an adviser sends its own messages
         if network.inputs != size or not MOTION <= network.outputs <= most:
             raise PolicyError(
@@ -112,7 +112,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         layer = Guard(layout, num_worlds) if self.safeguard else None
         if self.adviser is not None:
-            layer = Advice(self.adviser, layout, num_worlds, believes=self.encoding.believes)
+            layer = Advice(self.adviser, layout, num_worlds)
         return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), layer)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.support.learned import network_for, policy_for
+from tests.support.learned import network_for
 
 import posse
 from posse_baselines import DDCS, PolicyError, load, play
@@ -12,10 +12,10 @@ from posse_baselines.safeguard import Advice, check_adviser
 SCRIPT = DDCS.of("ddcs-distributed")
 
 
-def listener(answer: tuple[float, float], kind: str = "slots") -> LearnedPolicy:
+def listener(answer: tuple[float, float], kind: str = "features") -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
     encoding, adviser = Encoding.of(worlds().layout, kind), SCRIPT
-    size = encoding.size + check_adviser(adviser, believes=encoding.believes)
+    size = encoding.size + check_adviser(adviser)
     network = network_for(size, weights=(np.zeros((2, size), np.float32),), biases=(np.array(answer, np.float32),))
     return LearnedPolicy(network, encoding, {"name": "mine"}, adviser)
 
@@ -24,7 +24,7 @@ def worlds(count: int = 6, first: int = 0) -> posse.Batch:
     return posse.batch("field", count, message_size=SCRIPT.message_size, first_world=first, horizon=80)
 
 
-@pytest.mark.parametrize("kind", ["plain", "slots", "belief"])
+@pytest.mark.parametrize("kind", ["plain", "features"])
 def test_an_answer_of_zero_is_the_adviser_itself(kind: str) -> None:
     mine = play(worlds(), listener((0.0, 0.0), kind), seed=3)
     ddcs = play(worlds(), SCRIPT, seed=3)
@@ -53,7 +53,7 @@ def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
 def test_restarted_worlds_change_no_advice_in_the_others() -> None:
     rng = np.random.default_rng(0)
     batch, alone = worlds(4), worlds(1, first=2)
-    advice, other = (Advice(SCRIPT, each.layout, each.num_worlds, believes=True) for each in (batch, alone))
+    advice, other = (Advice(SCRIPT, each.layout, each.num_worlds) for each in (batch, alone))
     advice.follow(batch.reset(seed=5))
     other.follow(alone.reset(seed=5))
     for step in range(40):
@@ -71,6 +71,4 @@ def test_restarted_worlds_change_no_advice_in_the_others() -> None:
 def test_only_policies_of_the_ddcs_are_advisers() -> None:
     for name in ("planner", "pursuit"):
         with pytest.raises(PolicyError, match="use a policy of the DDCS"):
-            check_adviser(load(name), believes=False)
-    with pytest.raises(PolicyError, match="needs an adviser"):
-        policy_for(worlds().layout, "belief")
+            check_adviser(load(name))

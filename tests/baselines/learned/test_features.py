@@ -62,8 +62,8 @@ def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
 
 
 def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.void]:
-    """The features of the encoding explore, records (E, N)."""
-    encoding = Encoding.of(batch.layout, "explore")
+    """The features of the encoding features, records (E, N)."""
+    encoding = Encoding.of(batch.layout, "features")
     rows = Encoder(encoding, batch.layout).encode(observations)[:, : encoding.num_features]
     return np.ascontiguousarray(rows).view(encoding.features).reshape(observations.shape[:2])
 
@@ -187,7 +187,7 @@ def test_explores_ahead_away_from_others_and_from_walls(places: list[tuple[int, 
 
 def test_a_team_that_explores_finds_the_target() -> None:
     """A linear policy that reads nothing but the direction to its slot, or to explore in."""
-    encoding = Encoding("explore", 0, ())
+    encoding = Encoding("features", 0, ())
     weights = np.zeros((2, encoding.num_features), np.float32)
     at = encoding.features.fields["law_direction"][1] // 4  # type: ignore[index]
     weights[0, at] = weights[1, at + 1] = 1.0

@@ -120,7 +120,7 @@ def test_teams_of_several_sizes_and_scenarios() -> None:
         posse.batch("constant", 2, num_trackers=3, autoreset="disabled", horizon=50),
         posse.batch("radio", 3, num_trackers=7, autoreset="disabled", horizon=50),
     ]
-    encoding = Encoding.of(batches[1].layout, "slots", 4)
+    encoding = Encoding.of(batches[1].layout, "features", 4)
     env = TeamVecEnv(batches, encoding, see_state=True)
     assert env.num_envs == 2 * 3 + 3 * 7
     observations = env.reset()

@@ -81,7 +81,7 @@ def columns(policy: LearnedPolicy) -> dict[str, list[str]]:
     """
     encoding, network = policy.encoding, policy.network
     motion = ["ahead", "left"] if policy.adviser or policy.safeguard else ["speed", "turn_rate"]
-    believed = network.inputs - encoding.size - MOTION if encoding.believes else 0
+    believed = network.inputs - encoding.size - MOTION if policy.adviser else 0
     output = "correction" if policy.adviser else "wanted_velocity" if policy.safeguard else "action"
     every = {
         "features": [f"features[{k}]" for k in range(encoding.num_features)],

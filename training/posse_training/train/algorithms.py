@@ -174,7 +174,7 @@ def check_algorithm(settings: TrainSettings) -> None:
         )
     if kind is None:
         if settings.advise is None and settings.encoding == "plain":
-            raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use slots, or set advise")
+            raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use features, or set advise")
         if settings.advise is not None and settings.safeguard:
             raise SettingsError(
                 f"safeguard=True does not go with advise={settings.advise!r}, which has one: use the preset "

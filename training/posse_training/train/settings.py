@@ -90,9 +90,9 @@ class TrainSettings:
     """The action is a wanted velocity, which the safeguard of the script carries out."""
 
     # The networks
-    encoding: Literal["plain", "slots", "explore", "belief"] = "slots"
-    """Network inputs: the observation; with features computed from it; with fewer, for evolution; or for corrections
-    with the adviser's belief."""
+    encoding: Literal["plain", "features", "slots"] = "features"
+    """Network inputs: the observation; with features computed from it; or with more of them, which do not tell
+    where to explore."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
@@ -139,7 +139,7 @@ class TrainSettings:
     """Scripted policy that is corrected: the network reads the velocity that it wants, and adds to it."""
     population: int = number(32, "", 4, 1000)
     """Candidates in a generation."""
-    deviation: float = number(0.02, "", 1e-6, 10)
+    deviation: float = number(0.1, "", 1e-6, 10)
     """Standard deviation of the weights at the start."""
 
     # A warm start
@@ -248,8 +248,6 @@ def _conflicts(s: TrainSettings) -> Iterator[str]:
             f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}, where it "
             "begins"
         )
-    if s.encoding == "belief" and s.advise is None:
-        yield "encoding='belief' is the belief of an adviser, whom cmaes corrects: use the preset residual"
     if s.safeguard and s.imitate is not None:
         yield (
             f"safeguard=True does not go with imitate={s.imitate!r}, whose actions are no wanted velocities: use "
