@@ -1,5 +1,6 @@
 """The safeguard as an action layer: nothing else of the script moves a robot, and robots do not touch."""
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -20,8 +21,8 @@ def guarded(scenario: str, **changes: Any) -> LearnedPolicy:
     """A policy behind the safeguard whose untrained network gives small numbers."""
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario(scenario)), "features")
     network = network_for(encoding.size, **changes)
-    small = tuple(np.float32(1e-3) * weight for weight in network.weights)
-    network = type(network)(**{**vars(network), "weights": small})
+    small = {name: tuple(np.float32(1e-3) * array for array in getattr(network, name)) for name in ("weights", "biases")}
+    network = replace(network, **small)
     return LearnedPolicy(network, encoding, {"name": "untrained"}, safeguard=True)
 
 

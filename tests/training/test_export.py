@@ -79,7 +79,7 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
 def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path) -> None:
     script = DDCS()
     batch, observations = observations_of("smart", message_size=script.message_size)
-    encoding = Encoding.of(batch.layout, "belief")
+    encoding = Encoding.of(batch.layout, "features")
     proposals, memory = script.propose(observations, script.begin(batch.layout, 6))
     further = np.concatenate([proposals, beliefs_of(memory, observations)], axis=-1)
     policy = LearnedPolicy(network_for(encoding.size + further.shape[-1]), encoding, {}, load("ddcs-distributed"))

@@ -26,6 +26,7 @@ from posse_baselines import Policy, batch_for, load, rollout
 from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_baselines.learned.features import FEATURES
 from posse_baselines.safeguard import MOTION, check_adviser
 from posse_training.errors import require
 from posse_training.files import hold_settings, intact
@@ -170,7 +171,8 @@ def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
 def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
     """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
     encoding = Encoding(settings.encoding, 0, ())
-    yield from _mirrored(encoding.features, 0)
+    if encoding.num_features:
+        yield from _mirrored(FEATURES, 0)
     if settings.advise is not None:
         yield from ((encoding.size, 1), (encoding.size + 1, -1))
         yield from _mirrored(BELIEF, encoding.size + MOTION)

@@ -37,37 +37,22 @@ _BIT: Final = np.uint64(1)
 
 MOST: Final = 16
 """Robots in a matching at most: the own one and the nearest ones that it knows of."""
-_MATES: Final = 3
 _F, _C = np.float32, np.complex64
 
 FEATURES: Final = record_type(
     ("speed", _F),  # share of the greatest
-    ("turn_rate", _F),  # share of the greatest
-    ("mates", _C, (_MATES, 2)),  # of the nearest ones: the position / (d + 1 m), the velocity less the own one, m/s
-    # zeros while the target is unknown, but slot and law of a tracker that explores:
-    ("slot_near", _C),  # the way to the own slot / (d + 0.3 m)
+    ("slot_near", _C),  # the way to the own slot, or to where to look for the target / (d + 0.3 m)
     ("slot_far", _C),  # the same / (d + 3 m)
     ("slot_away", _F),  # its length / (d + 1 m)
-    ("target", _C),  # the way to the target / (d + 1 m)
-    ("target_heading", _C),  # in the slot frame
-    ("target_velocity", _C),  # m/s
-    ("frame", _C),  # direction of the slot frame
-    ("slot", _C),  # from the target in the slot frame / (d + 3 m)
+    ("target", _C),  # the way to the target / (d + 1 m); 0 while it is unknown
+    ("target_velocity", _C),  # m/s; 0 while it is unknown
     ("law_speed", _F),  # of the velocity that the slot law wants, as a share of the greatest
     ("law_direction", _C),
     ("law_turn", _F),  # turn rate towards it, share of the greatest
-    ("held", _F),  # share of the known team-mates that are in their slots
-    ("seen", _F),  # 1: the tracker itself detects the target
-    ("age", _F),  # of the fix / (t + 1 s)
-    ("known", _F),  # 1
+    ("known", _F),  # 1, or 0 while the target is unknown
 )
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
-READ: Final = (
-    *("speed", "slot_near", "slot_far", "slot_away", "target", "target_velocity"),
-    *("law_speed", "law_direction", "law_turn", "known"),
-)
-"""The features that a tracker that explores reads: few weights are learned sooner."""
 
 TEAM: Final = record_type(
     ("count", np.int64),
@@ -86,9 +71,6 @@ class Known(NamedTuple):
     """Offsets of an observation's fields, an array of one record."""
     slots: npt.NDArray[np.complex64]
     """(N,) in the slot frame, m."""
-    explores: bool
-    """Whether an unknown target's slot lies where the tracker explores next, slots go on turning after the fix, those
-    in a wall are filled last, and the target moves along its heading."""
     first: bool
     """Whether of more slots than robots the first is filled at any rate."""
     patience: np.float32
@@ -101,36 +83,27 @@ def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray
 
     It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
     """
-    f, slots, explores = known.at[0], known.slots, known.explores
+    f, slots = known.at[0], known.slots
     _gather_team(row, f, known.patience, team)
-    top, speed = row[f.max_speed], row[f.speed]
-    out.speed, out.turn_rate = speed / top, row[f.turn_rate] / row[f.max_turn_rate]
-    has_fix = row[f.target_known] > 0.0
-    if explores and not has_fix:  # as if the own slot were far away in the direction to explore in
+    top = row[f.max_speed]
+    out.speed = row[f.speed] / top
+    if row[f.target_known] <= 0.0:  # as if the own slot were far away in the direction to explore in
         way = _explore(row, f, team)
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
-    for m in range(min(team.count - 1, _MATES)):
-        place = m * f.stride
-        out.mates[m, 0] = _soft(team.places[m + 1], ONE)
-        out.mates[m, 1] = scaled(pair(row, f.neighbour_heading + place), row[f.neighbour_speed + place]) - speed
-    if not has_fix:
-        return
-    velocity, theta, frame = pair(row, f.target_velocity), pair(row, f.target_heading), pair(row, f.target_frame)
-    rate: Any = ZERO  # of the slot frame, rad/s
-    if explores:
-        ahead: Any = dot(velocity, theta)  # robots move along their headings, which are less noisy than velocities
-        velocity = scaled(theta, max(ahead, ZERO))
-        turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))
-        frame *= turn
+    theta, frame = pair(row, f.target_heading), pair(row, f.target_frame)
+    ahead: Any = dot(pair(row, f.target_velocity), theta)  # robots move along their headings, which are less noisy
+    velocity = scaled(theta, max(ahead, ZERO))
+    turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
+    frame *= turn
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
     count = team.count - team.broken
     for s in range(len(slots)):
         place = _place_of(slots[s], target, frame)
-        more = _OUTSIDE if explores and _is_outside(row, f, place) else ZERO
+        more = _OUTSIDE if _is_outside(row, f, place) else ZERO
         for j in range(count):
             ways[s, j] = length(team.places[j] - place) + more
     match_slots(count, len(slots), ways, team.slots, known.first and team.broken > 0)
@@ -138,20 +111,12 @@ def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray
     way = _place_of(slot, target, frame)
     d = length(way)
     out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + ONE)
-    out.target, out.target_velocity, out.frame, out.slot = _soft(target, ONE), velocity, frame, _soft(slot, _FAR)
-    out.target_heading = theta * frame.conjugate()
+    out.target, out.target_velocity, out.known = _soft(target, ONE), velocity, ONE
     # The slot law: the slot's velocity plus a velocity towards it, proportional to the distance.
     wish = slot_velocity(velocity, rate, slot * frame) + scaled(way, _GAIN)
     wanted = length(wish)
     out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
     out.law_turn = _turn_to(wish, row, f)
-    held = 0
-    for j in range(count):
-        s = team.slots[j]
-        if s >= 0 and j != me:
-            held += ways[s, j] < _NEAR
-    out.held = held / max(count - 1, 1)
-    out.seen, out.age, out.known = row[f.target_seen], row[f.target_age] / (row[f.target_age] + ONE), ONE
 
 
 @compiled

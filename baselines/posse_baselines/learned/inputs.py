@@ -19,17 +19,13 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, READ, TEAM, Known, write_features
+from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
 from posse_baselines.policy import PolicyError
 
-_READ: Final = {"plain": (), "features": READ, "slots": FEATURES.names or ()}
-_FEATURES: Final = {kind: np.dtype([(name, FEATURES[name]) for name in names]) for kind, names in _READ.items()}
-KINDS: Final = tuple(_READ)
-"""``plain``: the observation; ``features``: :mod:`posse_baselines.learned.features`, then the observation; ``slots``:
-the same with more features, for a tracker that does not explore."""
+KINDS: Final = ("plain", "features")
+"""The observation; :mod:`posse_baselines.learned.features`, then the observation."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
-_SILENT: Final = 0.75  # s, between two control steps
 _HARDLY: Final = 1e-3  # probability
 _RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
 
@@ -93,14 +89,9 @@ class Encoding:
         return read + self.num_features
 
     @property
-    def features(self) -> np.dtype[Any]:
-        """The derived features, which precede the observation: a part of :data:`FEATURES`, without gaps."""
-        return _FEATURES[self.kind]
-
-    @property
     def num_features(self) -> int:
-        """Number of these."""
-        return self.features.itemsize // 4
+        """Number of features, which precede the observation."""
+        return NUM_FEATURES if self.kind == "features" else 0
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
@@ -166,26 +157,21 @@ class Encoder(OwnArrays):
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
         # What features are computed in, one of each for a thread.
         work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
-        every: Any = FEATURES.fields
-        named = [every[name] for name in encoding.features.names or ()]
-        self._features = np.array([at // 4 + k for kind, at, *_ in named for k in range(kind.itemsize // 4)], np.int64)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
-        explores = encoding.kind == "features"
-        first = not explores or bool(np.abs(slots).max() > layout.scenario.sensing_range)
-        patience = np.float32(_patience(layout.scenario) if explores else _SILENT)
-        self._for_features = Known(offsets_of(layout), slots, explores, first, patience), *work
+        first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
+        known = Known(offsets_of(layout), slots, first, np.float32(_patience(layout.scenario)))
+        self._for_features = known, *work
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Return (..., F) observations as (rows, size), written to ``out`` if given."""
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
-        if (count := len(self._features)) > 0:
+        if (count := self.encoding.num_features) > 0:
             features = np.zeros(len(rows), FEATURES)
             # The threads share out rows as if each were a world of one tracker.
             over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
-            numbers = features.view(np.float32).reshape(len(rows), NUM_FEATURES)
-            out[:, :count] = np.take(numbers, self._features, axis=1, mode="wrap")
+            out[:, :count] = features.view(np.float32).reshape(len(rows), count)
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
         read[:, missing] = self._unknown[missing]

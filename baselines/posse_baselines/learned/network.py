@@ -143,12 +143,17 @@ def _forward_rows(
 
 @compiled
 def _add_products(x: FloatArray, weights: FloatArray, biases: FloatArray, y: FloatArray) -> None:
-    """Write biases + weights x to y; weights lie input by input."""
-    count = len(biases)
+    """Write biases + weights x to y; weights lie input by input, of which four are added at a time."""
+    count, rest = len(biases), len(x) // 4 * 4
+    rows = weights[: len(x) * count].reshape(len(x), count)
     for j in range(count):
         y[j] = biases[j]
-    for i in range(len(x)):
-        xi = x[i]
-        row = weights[i * count : (i + 1) * count]
+    for i in range(0, rest, 4):
+        p, q, r, s = x[i], x[i + 1], x[i + 2], x[i + 3]
+        a, b, c, d = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
         for j in range(count):
-            y[j] += xi * row[j]
+            y[j] = y[j] + p * a[j] + q * b[j] + r * c[j] + s * d[j]
+    for i in range(rest, len(x)):
+        p, a = x[i], rows[i]
+        for j in range(count):
+            y[j] += p * a[j]

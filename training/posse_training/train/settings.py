@@ -90,9 +90,8 @@ class TrainSettings:
     """The action is a wanted velocity, which the safeguard of the script carries out."""
 
     # The networks
-    encoding: Literal["plain", "features", "slots"] = "features"
-    """Network inputs: the observation; with features computed from it; or with more of them, which do not tell
-    where to explore."""
+    encoding: Literal["plain", "features"] = "features"
+    """Network inputs: the observation, or with features computed from it."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
