@@ -53,7 +53,7 @@ def test_encoded_observations_are_played(safeguard: bool) -> None:
     model = PPO("MlpPolicy", env, n_steps=8, batch_size=80, device="cpu")
     observations, actions = acted(from_sb3(model, encoding=encoding, safeguard=safeguard), num_trackers=4)
     layout = posse.ObservationLayout(posse.get_scenario("constant", num_trackers=4))
-    inputs = Encoder(encoding, layout).encode(observations)
+    inputs = Encoder(encoding, layout, len(observations)).encode(observations)
     wanted = model.predict(inputs.reshape(8, -1), deterministic=True)[0].reshape(2, 4, 2)
     guard = Guard(layout, len(observations))
     guard.follow(observations)

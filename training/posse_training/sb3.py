@@ -78,7 +78,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states."""
         super().begin(layout, num_worlds)
-        encoder = None if self._encoding is None else Encoder(self._encoding, layout)
+        encoder = None if self._encoding is None else Encoder(self._encoding, layout, num_worlds)
         size = layout.size if self._encoding is None else self._encoding.size
         wanted = self.model.observation_space.shape
         got = (layout.scenario.num_trackers, size) if self._whole_team else (size,)
@@ -95,10 +95,12 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
 
     def restart(self, memory: Any, mask: BoolArray) -> Any:
         """Return the memory with recurrent networks restarted in the worlds of a mask (E,)."""
-        *rest, guard, states, begins = memory
+        layout, worlds, encoder, guard, states, begins = memory
+        if encoder is not None:
+            encoder.restart(mask)
         if guard is not None:
             guard.restart(mask)
-        return (*rest, guard, states, begins | np.repeat(mask, len(begins) // len(mask)))
+        return (layout, worlds, encoder, guard, states, begins | np.repeat(mask, len(begins) // len(mask)))
 
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F)."""

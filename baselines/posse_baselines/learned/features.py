@@ -2,7 +2,7 @@
 
 They contain nothing that the observation lacks; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
-slots to trackers.
+slots to trackers. Where fixes are noisy, they are averaged over time.
 
 All vectors are relative to the tracker: x ahead, y to the left (:mod:`posse_baselines.laws.geometry`). A length d is
 scaled to d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, FloatArray, Record, Records, compiled, record_type
+from posse.numeric import HALF, ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled
 from posse_baselines.laws.steering import slot_velocity
@@ -31,6 +31,7 @@ _FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
 _LAST: Final = 4096  # added to the numbers of broken robots, above all others
 _SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
+_JUMP: Final = np.float32(1.0)  # m; a fix farther than this from where it was expected replaces the estimate
 _OUTSIDE: Final = np.float32(20.0)  # m; a slot in a wall counts as so much farther
 _CLOSE: Final = np.float32(0.5)  # m
 _BIT: Final = np.uint64(1)
@@ -54,6 +55,10 @@ FEATURES: Final = record_type(
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 
+ESTIMATE: Final = record_type(("age", _F), ("place", _C), ("speed", _F))
+"""What a tracker remembers of the target: the age of its fix, s, -1 while it is unknown; where it was, m, and its
+speed, m/s."""
+
 TEAM: Final = record_type(
     ("count", np.int64),
     ("broken", np.int64),
@@ -73,13 +78,17 @@ class Known(NamedTuple):
     """(N,) in the slot frame, m."""
     first: bool
     """Whether of more slots than robots the first is filled at any rate."""
+    share: np.float32
+    """Of a new fix in the estimate of the target."""
     patience: np.float32
     """s; a robot silent for longer is taken for broken."""
 
 
 @compiled
-def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray, out: Record) -> None:
-    """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros.
+def write_features(
+    row: FloatArray, known: Known, estimate: Record, team: Record, ways: FloatArray, out: Record
+) -> None:
+    """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros, and update the estimate.
 
     It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
     """
@@ -87,18 +96,18 @@ def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray
     _gather_team(row, f, known.patience, team)
     top = row[f.max_speed]
     out.speed = row[f.speed] / top
-    if row[f.target_known] <= 0.0:  # as if the own slot were far away in the direction to explore in
+    if row[f.target_known] <= 0.0:
+        estimate.age = -ONE
+        # As if the own slot were far away in the direction to explore in.
         way = _explore(row, f, team)
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
     theta, frame = pair(row, f.target_heading), pair(row, f.target_frame)
     ahead: Any = dot(pair(row, f.target_velocity), theta)  # robots move along their headings, which are less noisy
-    velocity = scaled(theta, max(ahead, ZERO))
+    velocity, target = _estimate(row, f, theta, max(ahead, ZERO), known.share, estimate)
     turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
     frame *= turn
-    target = scaled(pair(row, f.target_bearing), row[f.target_range])
-    target += scaled(velocity, min(row[f.target_age], _OLDEST))
     me = _sort_by_number(team)
     count = team.count - team.broken
     for s in range(len(slots)):
@@ -117,6 +126,32 @@ def write_features(row: FloatArray, known: Known, team: Record, ways: FloatArray
     wanted = length(wish)
     out.law_speed, out.law_direction = min(wanted / top, ONE), _soft(wish, _SMALL)
     out.law_turn = _turn_to(wish, row, f)
+
+
+@compiled
+def _estimate(
+    row: FloatArray, f: Record, theta: complex, speed: Any, share: np.float32, old: Record
+) -> tuple[complex, complex]:
+    """Return the target's velocity and position, averages of its fix and the old estimate, and remember them.
+
+    A share of 1 takes the fix as it is.
+    """
+    averages = share < ONE and old.age >= ZERO
+    if averages:
+        speed = old.speed + share * (speed - old.speed)
+    velocity = scaled(theta, speed)
+    target = scaled(pair(row, f.target_bearing), row[f.target_range])
+    target += scaled(velocity, min(row[f.target_age], _OLDEST))
+    position, heading = pair(row, f.position), pair(row, f.heading)
+    if averages:
+        step: Any = row[f.control_step]
+        guess = (old.place - position) * heading.conjugate() + scaled(velocity, step)
+        error = target - guess
+        if length(error) < _JUMP:
+            is_new = row[f.target_age] < old.age + HALF * step
+            target = guess + scaled(error, share if is_new else ZERO)
+    old.age, old.place, old.speed = row[f.target_age], position + target * heading, speed
+    return velocity, target
 
 
 @compiled

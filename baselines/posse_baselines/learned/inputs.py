@@ -17,15 +17,16 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.learned.features import FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
+from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, TEAM, Known, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
+_SHARE: Final = 0.25  # of a new fix in the estimate of the target, where fixes are noisy
 _HARDLY: Final = 1e-3  # probability
 _RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
 
@@ -149,28 +150,55 @@ class Encoding:
 
 
 class Encoder(OwnArrays):
-    """An encoding applied to the observations of one layout, which has to fit: see :meth:`Encoding.columns`."""
+    """An encoding applied to the observations of R robots in each of E worlds.
 
-    def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
+    Args:
+        encoding: Which numbers are read.
+        layout: Of the observations, which has to fit: see :meth:`Encoding.columns`.
+        num_worlds: E.
+        robots: R; default: all trackers.
+
+    Attributes:
+        estimates: (E, R), what each robot remembers of the target (:data:`posse_baselines.learned.features.ESTIMATE`).
+    """
+
+    def __init__(
+        self, encoding: Encoding, layout: ObservationLayout, num_worlds: int, robots: int | None = None
+    ) -> None:
         self.encoding = encoding
+        self.estimates = np.zeros((num_worlds, robots or layout.scenario.num_trackers), ESTIMATE)
+        self.estimates["age"] = -1.0
         self._columns, self._unknown = encoding.columns(layout)
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
         # What features are computed in, one of each for a thread.
         work = np.empty(MOST_THREADS, TEAM), np.empty((MOST_THREADS, len(slots), MOST), np.float32)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
-        known = Known(offsets_of(layout), slots, first, np.float32(_patience(layout.scenario)))
-        self._for_features = known, *work
+        noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
+        share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(_patience(layout.scenario))
+        self._for_features = Known(offsets_of(layout), slots, first, share, patience), *work
 
-    def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
-        """Return (..., F) observations as (rows, size), written to ``out`` if given."""
+    def restart(self, mask: BoolArray) -> None:
+        """Forget the target in the worlds of a mask (E,), whose episodes restart."""
+        self.estimates["age"][mask] = -1.0
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return what is remembered as arrays (E, R) by name; views, not copies."""
+        return {f"target_{name}": self.estimates[name] for name in ESTIMATE.names or ()}
+
+    def encode(self, observations: FloatArray, out: FloatArray | None = None, worlds: Any = ...) -> FloatArray:
+        """Return observations (worlds, R, F) of all worlds, or of those, as (rows, size), written to ``out`` if given.
+
+        Call it once a control step.
+        """
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
         if (count := self.encoding.num_features) > 0:
-            features = np.zeros(len(rows), FEATURES)
+            features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
             # The threads share out rows as if each were a world of one tracker.
-            over_worlds(_write_all, (rows, self._for_features, features), len(rows), 1)
+            over_worlds(_write_all, (rows, self._for_features, estimates.reshape(-1), features), len(rows), 1)
+            self.estimates[worlds] = estimates
             out[:, :count] = features.view(np.float32).reshape(len(rows), count)
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
@@ -187,7 +215,9 @@ def _patience(scenario: Scenario) -> float:
 
 
 @kernel
-def _write_all(rows: FloatArray, given: Any, features: Records, thread: int, first: int, end: int) -> None:
+def _write_all(
+    rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
+) -> None:
     known, teams, ways = given
     for r in range(first, end):
-        write_features(rows[r], known, teams[thread], ways[thread], features[r])
+        write_features(rows[r], known, estimates[r], teams[thread], ways[thread], features[r])

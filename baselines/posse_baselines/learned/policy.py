@@ -113,7 +113,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         layer = Guard(layout, num_worlds) if self.safeguard else None
         if self.adviser is not None:
             layer = Advice(self.adviser, layout, num_worlds)
-        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), layer)
+        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout, num_worlds, robots), layer)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -136,14 +136,15 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return forward(self._flat, inputs)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with adviser and safeguard restarted in the worlds of a mask (E,)."""
+        """Return the memory with encoder, adviser and safeguard restarted in the worlds of a mask (E,)."""
+        memory.encoder.restart(mask)
         if memory.layer is not None:
             memory.layer.restart(mask)
         return memory
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory of adviser or safeguard as arrays by name; views, not copies."""
-        return {} if memory.layer is None else dict(memory.layer.arrays())
+        """Return the memory of encoder, adviser and safeguard as arrays by name; views, not copies."""
+        return {**memory.encoder.arrays(), **({} if memory.layer is None else memory.layer.arrays())}
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""

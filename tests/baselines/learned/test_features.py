@@ -20,7 +20,7 @@ from posse_baselines.learned.features import FEATURES, match_slots
 def test_names_are_those_of_views() -> None:
     batch, observations = observations_of("radio")
     encoding = Encoding.of(batch.layout, neighbours=3)  # of five: the nearest
-    views, rows = batch.layout.views(observations), Encoder(encoding, batch.layout).encode(observations)
+    views, rows = batch.layout.views(observations), Encoder(encoding, batch.layout, batch.num_worlds).encode(observations)
     for name, column in zip(encoding.names(), rows.T, strict=True):
         field, _, at = name.rstrip("]").partition("[")
         index = tuple(int(i) for i in at.split(", ") if i)
@@ -39,7 +39,7 @@ def test_longer_messages_than_it_uses_change_nothing() -> None:
 
 def test_places_that_a_small_team_lacks_are_unknown() -> None:
     full, batch = posse.batch("smart").layout, posse.batch("smart", num_trackers=2)
-    rows = Encoder(Encoding.of(full), batch.layout).encode(batch.reset())
+    rows = Encoder(Encoding.of(full), batch.layout, batch.num_worlds).encode(batch.reset())
     named = full.views(rows)
     np.testing.assert_array_equal(named["neighbour_range"][:, 1:], -1)
     np.testing.assert_array_equal(named["neighbour_bearing"][:, 1:], 0)
@@ -64,7 +64,7 @@ def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
 def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.void]:
     """The features of the encoding features, records (E, N)."""
     encoding = Encoding.of(batch.layout, "features")
-    rows = Encoder(encoding, batch.layout).encode(observations)[:, : encoding.num_features]
+    rows = Encoder(encoding, batch.layout, batch.num_worlds).encode(observations)[:, : encoding.num_features]
     return np.ascontiguousarray(rows).view(FEATURES).reshape(observations.shape[:2])
 
 
@@ -230,7 +230,7 @@ def test_actions_are_the_networks_output(kind: str, activation: str, output: str
     batch, observations = observations_of("field")
     policy = policy_for(batch.layout, kind, activation=activation, output=output)
     actions, _ = policy.act(observations, policy.begin(batch.layout, 6))
-    rows = Encoder(policy.encoding, batch.layout).encode(observations)
+    rows = Encoder(policy.encoding, batch.layout, batch.num_worlds).encode(observations)
     expected = in_double_precision(policy.network, rows).reshape(actions.shape)
     np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(actions).max() <= 1

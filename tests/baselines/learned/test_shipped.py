@@ -53,7 +53,7 @@ def test_a_shipped_team_says_how_it_was_made(path: Path) -> None:
     assert [play["version"] for play in card["check"]["plays"]] == [scenario.version for scenario in scenarios]
     for scenario in scenarios:
         needs = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
-        Encoder(policy.encoding, posse.ObservationLayout(needs))
+        Encoder(policy.encoding, posse.ObservationLayout(needs), 1)
     with pytest.raises(ValueError, match="was trained on the split 'train'"):
         evaluate(policy, "constant", 1, split="train", progress=False)
 

@@ -125,7 +125,7 @@ def test_teams_of_several_sizes_and_scenarios() -> None:
     assert env.num_envs == 2 * 3 + 3 * 7
     observations = env.reset()
     again = posse.batch("radio", 3, num_trackers=7, horizon=50)
-    expected = Encoder(encoding, again.layout).encode(again.reset())
+    expected = Encoder(encoding, again.layout, again.num_worlds).encode(again.reset())
     np.testing.assert_array_equal(observations[6:, : encoding.size], expected)
     assert np.isfinite(move(env, np.zeros((27, 2), np.float32))[0]).all()
 

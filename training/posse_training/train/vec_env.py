@@ -179,7 +179,7 @@ class SlotGroup:
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         self.num_slots = worlds * trackers
         self.size = encoding.size + (state.size if state else 0)
-        self._encoder = Encoder(encoding, batch.layout)
+        self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
         self._state = state
         # What makes the robots' actions of the model's.
         self._layer = Guard(batch.layout, worlds) if safeguard else None
@@ -198,6 +198,7 @@ class SlotGroup:
 
     def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
+        self._encoder.restart(mask)
         if self._layer is not None:
             self._layer.restart(mask)
             self._layer.follow(raw, mask)
@@ -226,12 +227,12 @@ class SlotGroup:
         terms = {name: told[f"reward/{name}"] for name in batch.term_names}
         return self.encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
 
-    def encode(self, raw: FloatArray, worlds: Any = slice(None)) -> FloatArray:
-        """Return the observations (slots, size) of all slots, or of those of some worlds."""
+    def encode(self, raw: FloatArray, worlds: Any = ...) -> FloatArray:
+        """Return the observations (slots, size) of all slots, or of those of some worlds; call it once a step."""
         seen = raw[worlds]
         out = np.empty((seen.shape[0] * seen.shape[1], self.size), np.float32)
         own = self._encoder.encoding.size
-        self._encoder.encode(seen, out[:, :own])
+        self._encoder.encode(seen, out[:, :own], worlds)
         if self._state is not None:
             self._state.write(out[:, own:], worlds)
         return out
@@ -264,7 +265,8 @@ class SlotGroup:
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return every array by name; views, not copies, without padding between fields."""
-        own = {**self.batch.arrays.by_name(), "cut_at": self._cut_at, "returns": self._returns}
+        own = {**self.batch.arrays.by_name(), **self._encoder.arrays()}
+        own |= {"cut_at": self._cut_at, "returns": self._returns}
         if self._layer is not None:
             kind = type(self._layer).__name__.lower()
             own |= {f"{kind}.{name}": array for name, array in self._layer.arrays().items()}
