@@ -21,8 +21,8 @@ def guarded(scenario: str, **changes: Any) -> LearnedPolicy:
     """A policy behind the safeguard whose untrained network gives small numbers."""
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario(scenario)), "features")
     network = network_for(encoding.size, **changes)
-    small = {name: tuple(np.float32(1e-3) * array for array in getattr(network, name)) for name in ("weights", "biases")}
-    network = replace(network, **small)
+    weights, biases = (tuple(np.float32(1e-3) * a for a in arrays) for arrays in (network.weights, network.biases))
+    network = replace(network, weights=weights, biases=biases)
     return LearnedPolicy(network, encoding, {"name": "untrained"}, safeguard=True)
 
 

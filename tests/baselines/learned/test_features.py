@@ -20,7 +20,7 @@ from posse_baselines.learned.features import FEATURES, match_slots
 def test_names_are_those_of_views() -> None:
     batch, observations = observations_of("radio")
     encoding = Encoding.of(batch.layout, neighbours=3)  # of five: the nearest
-    views, rows = batch.layout.views(observations), Encoder(encoding, batch.layout, batch.num_worlds).encode(observations)
+    views, rows = batch.layout.views(observations), Encoder(encoding, batch.layout, 6).encode(observations)
     for name, column in zip(encoding.names(), rows.T, strict=True):
         field, _, at = name.rstrip("]").partition("[")
         index = tuple(int(i) for i in at.split(", ") if i)
@@ -151,6 +151,26 @@ def test_a_target_moves_along_its_heading() -> None:
     after = features_of(batch, observations)
     for name in before.dtype.names or ():
         np.testing.assert_allclose(after[name], before[name], atol=1e-5)
+
+
+def test_noisy_fixes_are_averaged_while_robots_drive() -> None:
+    """A share of 1/4 leaves sqrt(1/7) of the deviation of white noise; the target drives straight on."""
+    batch = posse.batch("constant", 40, seed=1, range_noise=0.02, bearing_noise=0.02)
+    encoder = Encoder(Encoding.of(batch.layout, "features"), batch.layout, 40)
+    observations = batch.reset()
+    for _ in range(40):
+        rows = encoder.encode(observations)
+        observations, *_ = batch.step(np.full(batch.action_shape, 0.5, np.float32))
+    rows, views = encoder.encode(observations), batch.layout.views(observations)
+    soft = np.ascontiguousarray(rows[:, : encoder.encoding.num_features]).view(FEATURES)["target"].reshape(40, 5)
+    true = (points(batch, "world")[:, None] - points(batch, "tracker")) / directions(batch, "tracker")
+    measured = views["target_range"] * (views["target_bearing"] @ [1, 1j])
+    raw, averaged = (np.sqrt(np.mean(np.abs(way - true) ** 2)) for way in (measured, soft / (1 - np.abs(soft))))
+    assert averaged < 0.6 * raw
+    encoder.restart(np.arange(40) < 20)
+    again, anew = encoder.encode(observations), Encoder(encoder.encoding, batch.layout, 40).encode(observations)
+    np.testing.assert_array_equal(again[:100], anew[:100])
+    assert (again[100:] != anew[100:]).any()
 
 
 def test_nothing_known_of_the_target_is_zeros() -> None:
