@@ -148,8 +148,8 @@ def _estimate(
         guess = (old.place - position) * heading.conjugate() + scaled(velocity, step)
         error = target - guess
         if length(error) < _JUMP:
-            is_new = row[f.target_age] < old.age + HALF * step
-            target = guess + scaled(error, share if is_new else ZERO)
+            gain: Any = share if row[f.target_age] < old.age + HALF * step else ZERO  # 0: no new fix
+            target = guess + scaled(error, gain)
     old.age, old.place, old.speed = row[f.target_age], position + target * heading, speed
     return velocity, target
 
