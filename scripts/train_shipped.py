@@ -22,7 +22,7 @@ from posse_training.train.train import train
 CORRECTIONS: Final = ("smart", "search", "obstacles", "radio", "leader-loss", "field", "robots")
 """Scenarios with a team that corrects the script, ``corrected-SCENARIO``."""
 LEAGUE: Final = LeagueSettings(
-    scenario="duel", generations=6, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
+    scenario="duel", generations=4, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
 )
 EVADERS: Final = ("evader", "evader-2", "evader-3")
 """The last targets of three leagues."""
@@ -30,7 +30,7 @@ DUEL: Final[dict[str, Any]] = {
     "target": ",".join(("smart", "constant", *OPEN_LOOP, *(each for each in EVADERS for _ in range(3)))),
     "num_worlds": 266,
     "steps": 6_000_000,
-    "start": str(LEAGUE.path / "generation-06" / "trackers"),
+    "start": str(LEAGUE.path / "generation-04" / "trackers"),
 }
 """Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
 FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")

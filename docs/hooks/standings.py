@@ -152,12 +152,12 @@ def duel_leagues() -> str:
     rows = []
     for path in LEAGUES:
         found = {pair: float(run["safe_score"]) for pair, run in _league(path).items()}
-        for team in ("ddcs-tuned", "trackers-6"):
+        for team in ("ddcs-tuned", "trackers-4"):
             of = {target: score for (each, target), score in found.items() if each == team}
             worst = min(of, key=lambda name: of[name])
-            shown = (f"{of[name]:.3f}" for name in ("smart", "target-1", "target-6"))
+            shown = (f"{of[name]:.3f}" for name in ("smart", "target-1", "target-4"))
             rows.append((path.stem, code(team), *shown, f"{of[worst]:.3f}, {code(worst)}"))
-    targets = (code(name) for name in ("smart", "target-1", "target-6"))
+    targets = (code(name) for name in ("smart", "target-1", "target-4"))
     return table(("seed", "team", *targets, "lowest, and against whom"), rows)
 
 
