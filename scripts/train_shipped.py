@@ -19,7 +19,7 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-CORRECTIONS: Final = ("smart", "search", "obstacles", "radio", "leader-loss", "field", "robots")
+CORRECTIONS: Final = ("smart", "radio", "leader-loss", "robots")
 """Scenarios with a team that corrects the script, ``corrected-SCENARIO``."""
 LEAGUE: Final = LeagueSettings(
     scenario="duel", generations=4, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
@@ -35,7 +35,7 @@ DUEL: Final[dict[str, Any]] = {
 """Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
 FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
-SEEDS: Final = {"smart": 5, "field": 5}
+SEEDS: Final = {"smart": 5}
 """Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
 SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
 """Scenarios with a team of their own."""
@@ -46,7 +46,7 @@ class Settings:
     """Command-line arguments."""
 
     seed: tuple[int, ...] = ()
-    """Training seeds; default: 1 to 3, of the corrections for smart and field 1 to 5."""
+    """Training seeds; default: 1 to 3, of the correction for smart 1 to 5."""
     scenario: tuple[str, ...] = SCENARIOS
     """Scenarios to train on."""
     out: Path = Path("runs/shipped")

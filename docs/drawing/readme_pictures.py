@@ -31,10 +31,10 @@ SHOWN: Final = {
     "accelerating": ("ddcs-distributed", 14.0),
     "smart": ("learned-smart", 18.0),
     "search": ("ddcs-distributed", 24.0),
-    "obstacles": ("corrected-obstacles", 22.0),
+    "obstacles": ("learned-obstacles", 22.0),
     "radio": ("learned-radio", 10.0),
     "leader-loss": ("pngl-l-phi", 20.0),
-    "field": ("corrected-field", 26.0),
+    "field": ("learned-field", 26.0),
     "duel": ("learned-smart", 18.0),
     "robots": ("ddcs-distributed", 57.0),
 }

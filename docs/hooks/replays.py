@@ -35,10 +35,10 @@ class Shown:
 REPLAYS: Final = {
     "smart": Shown("smart", ("ddcs-distributed", "learned-smart")),
     "search": Shown("search", ("pngl-l-phi", "ddcs-distributed")),
-    "obstacles": Shown("obstacles", ("ddcs-distributed", "corrected-obstacles")),
+    "obstacles": Shown("obstacles", ("ddcs-distributed", "learned-obstacles")),
     "radio": Shown("radio", ("ddcs-distributed", "learned-radio")),
     "leader-loss": Shown("leader-loss", ("ddcs-centralized-no-exchange", "pngl-l-phi"), seconds=30.0),
-    "field": Shown("field", ("ddcs-distributed", "corrected-field")),
+    "field": Shown("field", ("ddcs-distributed", "learned-field")),
     "duel-evader": Shown("duel", ("ddcs-tuned", "learned-duel"), target="evader"),
     "paper-distributed": Shown("paper-distributed", ("pngl", "ddcs-distributed"), seconds=8.0),
 }
