@@ -35,8 +35,6 @@ DUEL: Final[dict[str, Any]] = {
 """Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
 FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
-SEEDS: Final = {"smart": 5}
-"""Number of training seeds of the corrections, 3 for the other scenarios and from nothing."""
 SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
 """Scenarios with a team of their own."""
 
@@ -45,8 +43,8 @@ SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
 class Settings:
     """Command-line arguments."""
 
-    seed: tuple[int, ...] = ()
-    """Training seeds; default: 1 to 3, of the correction for smart 1 to 5."""
+    seed: tuple[int, ...] = (1, 2, 3)
+    """Training seeds."""
     scenario: tuple[str, ...] = SCENARIOS
     """Scenarios to train on."""
     out: Path = Path("runs/shipped")
@@ -61,12 +59,12 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
                 f"scenario={name!r:.80} has no learned team of its own; those that have: {', '.join(SCENARIOS)}"
             )
     runs = []
-    for seed in settings.seed or range(1, 1 + max(SEEDS.values())):
+    for seed in settings.seed:
         for name in settings.scenario:
-            if name in CORRECTIONS and (settings.seed or seed <= SEEDS.get(name, 3)):
+            if name in CORRECTIONS:
                 corrects = default_settings(name, preset="residual")
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
-            if name in FROM_NOTHING and (settings.seed or seed <= 3):
+            if name in FROM_NOTHING:
                 learns = replace(default_settings(name), **(DUEL if name == "duel" else {}))
                 runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
