@@ -47,7 +47,7 @@ def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
         ("smart", "pngl-l-phi", False),  # it always sees the target, and estimates ψ itself
         ("radio", "ddcs-tuned", True),
         ("field", "learned-field", True),
-        ("search", "corrected-radio", True),
+        ("search", "corrected-smart", True),
     ],
 )
 def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, frame: bool) -> None:
