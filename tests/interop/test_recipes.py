@@ -31,7 +31,7 @@ def test_a_recipe_runs_in_an_environment_of_its_own(name: str, tmp_path: Path) -
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed", "corrected-robots"])
+@pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed"])
 def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> None:
     shown = elsewhere(RECIPES / "robotarium.py", team, "0.5", "3", cwd=tmp_path, seconds=300)
     settled, clean = (int(part.split()[0]) for part in shown.splitlines()[-1].split(", "))
