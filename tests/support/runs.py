@@ -17,7 +17,7 @@ from posse_training.train.checkpoint import read_checkpoint
 from posse_training.train.train import train
 
 HORIZON = 40
-SHORT: dict[str, Any] = {"horizon": HORIZON, "settle_time": 1.0}
+SHORT: dict[str, Any] = {"horizon": HORIZON, "settle_time": 1.0, "range_noise": 0.02, "bearing_noise": 0.02}
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:

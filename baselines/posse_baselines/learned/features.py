@@ -1,6 +1,6 @@
 """Features that follow from an observation: the own slot and the way to it, or to where to look for the target.
 
-They contain nothing that the observation lacks; a network could learn them, but would first have to
+They contain nothing that the observations of an episode lack; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
 slots to trackers. Where fixes are noisy, they are averaged over time.
 
