@@ -58,7 +58,7 @@ def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, see
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
     folder = s.out / f"{algorithm}-{'safe' if safeguard else 'bare'}-{scenario}-{seed}"
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
-    run["hidden"] = (64, 64)  # of all algorithms alike
+    run["hidden"] = (128, 128)  # of all algorithms alike
     base = default_settings(scenario, algorithm, preset="nothing")
     return replace(base, **run, safeguard=safeguard, tensorboard=False, beside=None)
 
