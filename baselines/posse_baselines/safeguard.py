@@ -26,7 +26,6 @@ from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import guard_all
-from posse_baselines.ddcs.belief import BELIEF_SIZE, beliefs_of
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import Policy, PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
@@ -94,17 +93,16 @@ def check_adviser(policy: Policy | None) -> int:
         return 0
     if not isinstance(policy, DDCS):
         raise PolicyError(f"{policy.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
-    return MOTION + BELIEF_SIZE
+    return MOTION
 
 
 class Advice(Guard):
     """The safeguard of a scripted adviser, which carries out the velocities of the script as a network corrects them.
 
     Residual policy learning: at each step the adviser, a team of the DDCS, proposes the velocity that it wants, the
-    network reads the proposal and what the adviser believes, and twice its output is added to the proposal, before the
-    safeguard. An output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are
-    sent unchanged, and its memory is its own, so the network needs no memory. References: Silver et al. 2018, Johannink
-    et al. 2019; Alshiekh et al. 2018 (safeguard).
+    network reads the proposal beside its other inputs, and twice its output is added to it, before the safeguard. An
+    output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are sent
+    unchanged. References: Silver et al. 2018, Johannink et al. 2019; Alshiekh et al. 2018 (safeguard).
 
     Args:
         adviser: A policy of the DDCS.
@@ -113,17 +111,16 @@ class Advice(Guard):
     """
 
     def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int) -> None:
-        size = check_adviser(adviser)
+        check_adviser(adviser)
         super().__init__(layout, num_worlds, minds=adviser.begin(layout, num_worlds))
-        self.inputs = np.zeros((*self.minds.me.shape, size), np.float32)
+        self.inputs = np.zeros((*self.minds.me.shape, MOTION), np.float32)
         self._adviser = adviser
 
     def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
         """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
         kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
         super().follow(observations)
-        self.inputs[..., :MOTION], _ = self._adviser.propose(self._observed, self.minds)
-        self.inputs[..., MOTION:] = beliefs_of(self.minds, self._observed)
+        self.inputs[...], _ = self._adviser.propose(self._observed, self.minds)
         for name, array in self.arrays().items():
             if mask is not None:
                 array[~mask] = kept[name]

@@ -13,7 +13,6 @@ from tests.support.process import run_tests_elsewhere
 from posse.numeric import FloatArray
 from posse_baselines import load
 from posse_baselines.ddcs import DDCS
-from posse_baselines.ddcs.belief import beliefs_of
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
@@ -81,11 +80,10 @@ def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path)
     batch, observations = observations_of("smart", message_size=script.message_size)
     encoding = Encoding.of(batch.layout, "features")
     proposals, memory = script.propose(observations, script.begin(batch.layout, 6))
-    further = np.concatenate([proposals, beliefs_of(memory, observations)], axis=-1)
-    policy = LearnedPolicy(network_for(encoding.size + further.shape[-1]), encoding, {}, load("ddcs-distributed"))
+    policy = LearnedPolicy(network_for(encoding.size + 2), encoding, {}, load("ddcs-distributed"))
     wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
     encoded = Encoder(encoding, batch.layout, 6).encode(observations)
-    rows = np.concatenate([encoded, further.reshape(len(encoded), -1)], axis=1)
+    rows = np.concatenate([encoded, proposals.reshape(len(encoded), -1)], axis=1)
     change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
     action, _ = script.carry_out(observations, memory, change)
     np.testing.assert_allclose(action, wanted, rtol=0, atol=1e-5)

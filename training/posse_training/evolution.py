@@ -23,7 +23,6 @@ import numpy.typing as npt
 from posse.numeric import FloatArray
 from posse.scenarios.family import blocks
 from posse_baselines import Policy, batch_for, load, rollout
-from posse_baselines.ddcs.belief import BELIEF
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
@@ -42,8 +41,8 @@ from posse_training.tune import advance
 
 SOFTWARE: Final = "software.json"
 STATE: Final = "state.json"
-_TURNS: Final = ("turn_rate", "law_turn", "frame_rate")
-"""Inputs whose sign a mirror changes, beside the second number of every vector."""
+_TURN: Final = "law_turn"
+"""Feature whose sign a mirror changes, beside the second number of every vector."""
 
 
 def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads: int | None = None) -> Path:
@@ -155,39 +154,21 @@ class Candidates(LearnedPolicy):
 
 
 def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
-    """Return patterns (P, MOTION, inputs): their sum, weighted by a point's P numbers, is a network's weights."""
-    images = list(_images(settings))
-    basis = []
-    for column, (image, sign) in enumerate(images):
-        for output in range(MOTION):
-            weights = np.zeros((MOTION, len(images)), np.float32)
-            weights[output, column] = 1.0
-            weights[output, image] += -sign if output else sign
-            if image >= column and weights.any():
-                basis.append(weights / weights.max())
-    return np.array(basis)
+    """Return patterns (P, MOTION, inputs): their sum, weighted by a point's P numbers, is a network's weights.
+
+    Each has one weight, of an input that a mirror changes as it does the output.
+    """
+    turns = list(_turns()) + ([False, True] if settings.advise is not None else [])  # features, then the proposal
+    basis = np.zeros((len(turns), MOTION, len(turns)), np.float32)
+    for column, turn in enumerate(turns):
+        basis[column, int(turn), column] = 1.0
+    return basis
 
 
-def _images(settings: TrainSettings) -> Iterator[tuple[int, int]]:
-    """Yield for each input the one that shows it in a mirror, and its sign there: features, proposal, belief."""
-    encoding = Encoding(settings.encoding, 0, ())
-    if encoding.num_features:
-        yield from _mirrored(FEATURES, 0)
-    if settings.advise is not None:
-        yield from ((encoding.size, 1), (encoding.size + 1, -1))
-        yield from _mirrored(BELIEF, encoding.size + MOTION)
-
-
-def _mirrored(record: np.dtype[Any], start: int) -> Iterator[tuple[int, int]]:
-    """Yield the same for a record whose first number is input ``start``; ``looks`` are directions round the tracker."""
-    at = start
-    for name in record.names or ():
-        field = record[name]
-        size = field.itemsize // np.dtype(np.float32).itemsize
-        for k in range(size):
-            turns = k % 2 == 1 if field.base == np.complex64 else name in _TURNS
-            yield at + (-k % size if name == "looks" else k), -1 if turns else 1
-        at += size
+def _turns() -> Iterator[bool]:
+    """Yield for each feature whether a mirror changes its sign."""
+    for name in FEATURES.names or ():
+        yield from (False, True) if FEATURES[name] == np.complex64 else (name == _TURN,)
 
 
 def _steps_of(s: TrainSettings) -> int:

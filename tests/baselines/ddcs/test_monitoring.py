@@ -1,16 +1,14 @@
-"""Monitoring, the belief that a network reads, and detours."""
+"""Monitoring and detours."""
 
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.reference.state import Complexes, directions, points
 
 import posse
 from posse_baselines import begin, load, rollout
-from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
-from posse_baselines.ddcs.belief import BELIEF, beliefs_of
+from posse_baselines.ddcs import DDCS
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
 
 
@@ -66,59 +64,6 @@ def test_without_radio_nothing_heard_has_an_effect() -> None:
         without, deaf = policy.act(alone, deaf)
         np.testing.assert_array_equal(actions, without)
         observations, *_ = batch.step(actions)
-
-
-def way(soft: Complexes, scale: float) -> Complexes:
-    """The vector (m) that stands in beliefs with its length as d / (d + scale)."""
-    return np.asarray(soft * scale / (1.0 - np.abs(soft)))
-
-
-def beliefs(memory: Any, observations: Any) -> Any:
-    return np.ascontiguousarray(beliefs_of(memory, observations)).view(BELIEF)[..., 0]
-
-
-def test_the_belief_of_a_team_in_formation_is_correct() -> None:
-    ddcs = DDCS()
-    batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
-    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
-    for _ in range(250):
-        actions, memory = ddcs.act(observations, memory)
-        observations = batch.step(actions)[0]
-    ddcs.propose(observations, memory)
-    belief = beliefs(memory, observations)
-    at, own, target = points(batch, "tracker"), directions(batch, "tracker"), points(batch, "world")[:, None]
-    assert (belief["known"] == 1.0).all()
-    np.testing.assert_allclose(way(belief["target"], 3.0), (target - at) / own, rtol=0, atol=0.02)
-    moving = batch.scenario.target_speed * directions(batch, "world")[:, None] / own
-    np.testing.assert_allclose(belief["target_velocity"], moving, rtol=0, atol=0.05)
-    np.testing.assert_array_equal(belief["task"].sum(-1), 1.0)
-    flocking = belief["task"][..., FLOCKING] == 1.0
-    assert flocking.mean() > 0.9
-    assert (np.abs(way(belief["slot_near"], 0.3))[flocking] < 0.6).all()
-    assert not belief["lost"].any()
-    assert not belief["goal"].any()
-    np.testing.assert_array_equal(belief["present"], 1.0)
-    nearest = np.sort(np.abs(at[:, None] - at[:, :, None]), axis=-1)[..., 1]
-    np.testing.assert_allclose(np.abs(way(belief["mates"][..., 0], 1.0)), nearest, rtol=0, atol=0.05)
-    assert ((belief["looks"] >= 0.0) & (belief["looks"] <= 1.0)).all()
-
-
-def test_a_searcher_has_no_estimate_of_the_target() -> None:
-    ddcs = DDCS()
-    batch = posse.batch("search", 8, message_size=ddcs.message_size)
-    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
-    lost = []
-    for _ in range(20):
-        proposals, memory = ddcs.propose(observations, memory)
-        belief = beliefs(memory, observations)
-        searching = belief["task"][..., SEARCHING] == 1.0
-        assert searching.any()
-        for name in ("known", "target", "target_velocity", "frame", "frame_rate", "age", "has_slot", "slot_near"):
-            assert not belief[name][searching].any()
-        lost.append(belief["lost"][searching].max())
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
-        observations = batch.step(actions)[0]
-    np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)
 
 
 CLEARANCE = 0.2

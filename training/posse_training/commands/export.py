@@ -75,19 +75,17 @@ def export(policy: LearnedPolicy, out: str | Path) -> None:
 def columns(policy: LearnedPolicy) -> dict[str, list[str]]:
     """Return the names of the columns of each input, in order, and of the output, which is the last.
 
-    Inputs are ``features``, ``observation``, and an adviser's ``proposal`` and ``belief``, where the policy reads them.
+    Inputs are ``features``, ``observation`` and an adviser's ``proposal``, where the policy reads them.
     The output is the ``action``, the ``wanted_velocity`` that the safeguard carries out, or the ``correction`` of a
     proposal.
     """
     encoding, network = policy.encoding, policy.network
     motion = ["ahead", "left"] if policy.adviser or policy.safeguard else ["speed", "turn_rate"]
-    believed = network.inputs - encoding.size - MOTION if policy.adviser else 0
     output = "correction" if policy.adviser else "wanted_velocity" if policy.safeguard else "action"
     every = {
         "features": [f"features[{k}]" for k in range(encoding.num_features)],
         "observation": encoding.names(),
         "proposal": motion if policy.adviser else [],
-        "belief": [f"belief[{k}]" for k in range(believed)],
         output: motion + [f"message[{k}]" for k in range(network.outputs - MOTION)],
     }
     return {name: names for name, names in every.items() if names}

@@ -173,8 +173,8 @@ def check_algorithm(settings: TrainSettings) -> None:
             "script: use ppo"
         )
     if kind is None:
-        if settings.advise is None and settings.encoding == "plain":
-            raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use features, or set advise")
+        if settings.encoding == "plain":
+            raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use features")
         if settings.advise is not None and settings.safeguard:
             raise SettingsError(
                 f"safeguard=True does not go with advise={settings.advise!r}, which has one: use the preset "
