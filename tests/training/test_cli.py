@@ -111,7 +111,7 @@ INVALID = {
     "train --algorithm dqn": "unknown algorithm 'dqn'; algorithms are: ppo",
     "train --algorithm sac --preset residual": "preset='residual' goes with cmaes, not sac",
     "train --algorithm sac --no-safeguard --imitate pursuit": "needs algorithm ppo or mappo, not sac: leave it out",
-    "train --algorithm cmaes --advise None --encoding plain": "leaves cmaes nothing to read",
+    "train --algorithm cmaes --encoding plain": "leaves cmaes nothing to read",
     "train --algorithm cmaes --start runs/a": "start='runs/a' does not go with cmaes",
     "train --algorithm cmaes --message-size 2": "message_size=2 does not go with cmaes",
     "train --algorithm cmaes --side target": "corrects no script: use ppo",

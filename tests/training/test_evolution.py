@@ -21,7 +21,6 @@ from posse_training.train.train import train
 
 EVOLVED: dict[str, Any] = {
     "advise": "ddcs-tuned",
-    "encoding": "plain",
     "scenario": "constant",
     # So near to the target that slots are held from the start on.
     "overrides": {"horizon": 40, "settle_time": 1.0, "start_distance": (1.0, 2.0)},
@@ -30,7 +29,7 @@ EVOLVED: dict[str, Any] = {
     "steps": 6000,
     "evaluate_every": 2560,
 }
-NOTHING: dict[str, Any] = {**EVOLVED, "advise": None, "encoding": "features", "safeguard": True}
+NOTHING: dict[str, Any] = {**EVOLVED, "advise": None, "safeguard": True}
 
 
 def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
@@ -80,10 +79,7 @@ def test_a_mirrored_world_is_played_as_the_world(tmp_path: Path, how: dict[str, 
 
 def test_its_preset_says_whether_it_corrects_the_tuned_script() -> None:
     found = [default_settings("robots", "cmaes", preset=preset) for preset in ("residual", "nothing")]
-    assert [(s.advise, s.encoding, s.safeguard) for s in found] == [
-        ("ddcs-tuned", "plain", False),
-        (None, "features", True),
-    ]
+    assert [(s.advise, s.safeguard) for s in found] == [("ddcs-tuned", False), (None, True)]
     assert found[0] == default_settings("robots", preset="residual")
 
 
@@ -91,8 +87,8 @@ def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
     """Each of three at once has the score that it has alone, in two worlds of each of two opponents."""
     changes = {**EVOLVED, "overrides": {**EVOLVED["overrides"], "horizon": 200}, "num_worlds": 4}
     settings = small(tmp_path, "cmaes", **changes, target="smart,evader")
-    weights = np.zeros((3, 2, 40), np.float32)
-    weights[1:] = np.random.default_rng(0).normal(0.0, 0.05, (2, 2, 40))
+    weights = np.zeros((3, 2, 17), np.float32)
+    weights[1:] = np.random.default_rng(0).normal(0.0, 0.05, (2, 2, 17))
     together = Candidates(settings, weights, {}).scores(5, None)
     alone = [Candidates(settings, weights[k : k + 1], {}).scores(5, None)[0] for k in range(3)]
     assert together == pytest.approx(alone, abs=0.02)
