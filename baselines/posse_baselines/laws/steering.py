@@ -166,15 +166,15 @@ def assign(cost: npt.NDArray[Any], work: npt.NDArray[Any]) -> None:
     added along the cheapest augmenting path, O(n³).
 
     Args:
-        cost: (n, n), finite; left as it is. A row of zeros takes a column that is left over.
+        cost: (rows, n), rows <= n, finite; left as it is. A row of zeros takes a column that is left over.
         work: (WORK_ROWS, n + 1); in the end ``work[0, i]`` is the column of row i.
     """
-    n = len(cost)
+    rows, n = cost.shape
     # Rows and columns count from 1 here; 0 means none.
     answer, row_price, column_price, row_of = work[0], work[1], work[2], work[3]
     path, slack, done = work[4], work[5], work[6]
     work[1:5] = 0.0
-    for i in range(1, n + 1):
+    for i in range(1, rows + 1):
         row_of[0] = i
         j0 = 0
         for j in range(n + 1):
@@ -206,4 +206,5 @@ def assign(cost: npt.NDArray[Any], work: npt.NDArray[Any]) -> None:
             row_of[j0] = row_of[j1]
             j0 = j1
     for j in range(1, n + 1):
-        answer[int(row_of[j]) - 1] = j - 1
+        if row_of[j] != 0.0:
+            answer[int(row_of[j]) - 1] = j - 1

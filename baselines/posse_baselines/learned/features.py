@@ -19,22 +19,20 @@ import numpy.typing as npt
 from posse.numeric import HALF, ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled
-from posse_baselines.laws.steering import slot_velocity
+from posse_baselines.laws.steering import Work, assign, slot_velocity
 
 _SMALL: Final = np.float32(1e-6)
-_LARGE: Final = np.float32(1e9)
 _NEAR: Final = np.float32(0.3)  # m, the default tolerance
 _FAR: Final = np.float32(3.0)  # m
 _GAIN: Final[Any] = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's, which the outermost slot may have
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
-_LAST: Final = 4096  # added to the numbers of broken robots, above all others
 _SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
 _JUMP: Final = np.float32(1.0)  # m; a fix farther than this from where it was expected replaces the estimate
 _OUTSIDE: Final = np.float32(20.0)  # m; a slot in a wall counts as so much farther
 _CLOSE: Final = np.float32(0.5)  # m
-_BIT: Final = np.uint64(1)
+_FIRST: Final = 1e3  # m; by so much the first slot counts as nearer where it is filled at any rate
 
 MOST: Final = 16
 """Robots in a matching at most: the own one and the nearest ones that it knows of."""
@@ -61,10 +59,8 @@ speed, m/s."""
 
 TEAM: Final = record_type(
     ("count", np.int64),
-    ("broken", np.int64),
+    ("working", np.int64),  # of these; the others are taken for broken
     ("places", _C, (MOST,)),  # m
-    ("numbers", np.int64, (MOST,)),
-    ("slots", np.int64, (MOST,)),  # -1: none left
 )
 """The robots that a tracker knows of, itself among them, as :func:`write_features` works with them."""
 
@@ -85,12 +81,10 @@ class Known(NamedTuple):
 
 
 @compiled
-def write_features(
-    row: FloatArray, known: Known, estimate: Record, team: Record, ways: FloatArray, out: Record
-) -> None:
+def write_features(row: FloatArray, known: Known, estimate: Record, team: Record, work: Work, out: Record) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros, and update the estimate.
 
-    It works in ``team``, a :data:`TEAM`, and ``ways`` (N, MOST).
+    It works in ``team``, a :data:`TEAM`, and ``work``.
     """
     f, slots = known.at[0], known.slots
     _gather_team(row, f, known.patience, team)
@@ -108,16 +102,16 @@ def write_features(
     velocity, target = _estimate(row, f, theta, max(ahead, ZERO), known.share, estimate)
     turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
     frame *= turn
-    me = _sort_by_number(team)
-    count = team.count - team.broken
     for s in range(len(slots)):
-        place = _place_of(slots[s], target, frame)
+        place = target + slots[s] * frame
         more = _OUTSIDE if _is_outside(row, f, place) else ZERO
-        for j in range(count):
-            ways[s, j] = length(team.places[j] - place) + more
-    match_slots(count, len(slots), ways, team.slots, known.first and team.broken > 0)
-    slot = slots[max(team.slots[me], 0)]
-    way = _place_of(slot, target, frame)
+        if s == 0 and known.first and team.working < team.count:
+            more -= _FIRST
+        for j in range(team.working):
+            work.cost[j, s] = length(team.places[j] - place) + more
+    assign(work.cost[: team.working], work.assigning)
+    slot = slots[int(work.assigning[0, 0])]
+    way = target + slot * frame
     d = length(way)
     out.slot_near, out.slot_far, out.slot_away = _soft(way, _NEAR), _soft(way, _FAR), d / (d + ONE)
     out.target, out.target_velocity, out.known = _soft(target, ONE), velocity, ONE
@@ -220,83 +214,20 @@ def _soft(v: complex, scale: np.float32) -> complex:
 
 
 @compiled
-def _place_of(slot: complex, target: complex, frame: complex) -> complex:
-    """Return where a slot of a target is; rounded in this order, as networks learned to read it."""
-    x, y = target.real + slot.real * frame.real, target.imag + slot.real * frame.imag
-    return complex(x - slot.imag * frame.imag, y + slot.imag * frame.real)
-
-
-@compiled
 def _gather_team(row: FloatArray, f: Record, patience: np.float32, team: Record) -> None:
-    """Write the present positions of the known team, own robot first.
+    """Write the present positions of the known team: own robot, then those heard of, in the end those taken for broken.
 
-    Robots silent for longer than the ``patience`` (s) are taken for broken, and get the highest numbers.
+    These have been silent for longer than the ``patience`` (s).
     """
-    team.places[0], team.numbers[0], team.count, team.broken = 0j, int(row[f.number]), 1, 0
-    for p in range(f.neighbours):
-        place = p * f.stride
-        number = int(row[f.neighbour_number + place])
-        if number >= 0 and team.count < MOST:
-            run = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], _OLDEST)
-            way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
-            team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
-            broken = row[f.neighbour_age + place] > patience
-            team.numbers[team.count] = number + _LAST * broken
-            team.broken += broken
-            team.count += 1
-
-
-@compiled
-def _sort_by_number(team: Record) -> int:
-    """Sort robots by number, so that all trackers match alike; return the own robot's index."""
-    me = 0
-    for i in range(1, team.count):
-        place, number = team.places[i], team.numbers[i]
-        j = i
-        while j > 0 and team.numbers[j - 1] > number:
-            team.places[j], team.numbers[j] = team.places[j - 1], team.numbers[j - 1]
-            j -= 1
-        team.places[j], team.numbers[j] = place, number
-        me += j <= me
-    return me
-
-
-@compiled
-def match_slots(
-    count: int, num_slots: int, ways: FloatArray, chosen: npt.NDArray[np.int64], first: bool = False
-) -> None:
-    """Match ``count`` robots to slots; write each robot's slot to ``chosen``, -1 for none left.
-
-    Greedy by distance, with ``first`` beginning with the first slot; then pairwise swaps while one shortens the total
-    distance. Trackers that know of the same robots get the same result. ``ways[s, j]`` is the distance of robot j from
-    slot s, m.
-    """
-    for j in range(count):
-        chosen[j] = -1
-    taken = np.uint64(0)
-    for k in range(min(count, num_slots)):
-        best, robot, slot = _LARGE, -1, -1
-        for j in range(count):
-            if chosen[j] >= 0:
-                continue
-            for s in range(1 if k == 0 and first else num_slots):
-                if ways[s, j] < best and (taken >> np.uint64(s)) & _BIT == np.uint64(0):
-                    best, robot, slot = ways[s, j], j, s
-        if robot < 0:
-            break
-        chosen[robot] = slot
-        taken |= _BIT << np.uint64(slot)
-    for _ in range(count):
-        swapped = False
-        for i in range(1, count):
-            for j in range(i):
-                a, b = chosen[i], chosen[j]
-                if a < 0 or b < 0:
-                    continue
-                now = ways[a, i] + ways[b, j]
-                then = ways[b, i] + ways[a, j]
-                if then < now - _SMALL * now:
-                    chosen[i], chosen[j] = b, a
-                    swapped = True
-        if not swapped:
-            break
+    team.places[0], team.count = 0j, 1
+    for silent in (False, True):
+        for p in range(f.neighbours):
+            place = p * f.stride
+            age = row[f.neighbour_age + place]
+            if row[f.neighbour_number + place] >= ZERO and (age > patience) == silent and team.count < MOST:
+                way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
+                run = row[f.neighbour_speed + place] * min(age, _OLDEST)
+                team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
+                team.count += 1
+        if not silent:
+            team.working = team.count

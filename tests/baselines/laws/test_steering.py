@@ -96,17 +96,17 @@ def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: c
 
 
 @settings(derandomize=True, database=None, deadline=None, max_examples=60)
-@given(st.integers(1, 24), st.integers(0, 12), st.integers(0, 2**31), st.booleans())
-def test_the_sum_of_the_costs_is_the_least(n: int, absent: int, seed: int, ties: bool) -> None:
-    cost = np.random.default_rng(seed).uniform(-5, 20, (n, n))
+@given(st.integers(1, 24), st.integers(0, 12), st.integers(0, 12), st.integers(0, 2**31), st.booleans())
+def test_the_sum_of_the_costs_is_the_least(n: int, absent: int, more: int, seed: int, ties: bool) -> None:
+    cost = np.random.default_rng(seed).uniform(-5, 20, (n, n + more))
     if ties:
         cost = np.round(cost / 5)
     cost[n - min(n, absent) :] = 0.0
     # Other contents of the work space have no effect.
-    work, before = np.full((WORK_ROWS, n + 1), 7.0), cost.copy()
+    work, before = np.full((WORK_ROWS, n + more + 1), 7.0), cost.copy()
     assign(cost, work)
     found = work[0, :n].astype(int)
-    assert sorted(found) == [*range(n)]
+    assert len(set(found)) == n
     best = cost[linear_sum_assignment(cost)].sum()
     assert abs(cost[np.arange(n), found].sum() - best) < 1e-9
     np.testing.assert_array_equal(cost, before)

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from tests.support.learned import observations_of, policy_for
 from tests.support.reference.state import directions, points
 
@@ -14,7 +12,7 @@ import posse
 from posse.numeric import FloatArray
 from posse_baselines import rollout
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
-from posse_baselines.learned.features import FEATURES, match_slots
+from posse_baselines.learned.features import FEATURES
 
 
 def test_names_are_those_of_views() -> None:
@@ -210,23 +208,6 @@ def test_a_team_that_explores_finds_the_target() -> None:
     found = rollout(posse.batch("search", 100), policy).metrics["detection_time"]
     assert np.nanmedian(found) < 8.0
     assert np.isfinite(found).mean() > 0.97
-
-
-@settings(derandomize=True, deadline=None, max_examples=100)
-@given(robots=st.integers(1, 9), slots=st.integers(1, 12), seed=st.integers(0, 2**31))
-def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> None:
-    ways = np.random.default_rng(seed).uniform(0, 10, (robots, slots)).astype(np.float32)
-    chosen = np.empty(robots, np.int64)
-    match_slots(robots, slots, ways.T, chosen)
-    given_out = [s for s in chosen if s >= 0]
-    assert len(given_out) == len(set(given_out)) == min(robots, slots)
-    if robots <= slots:
-        total = ways[np.arange(robots), chosen].sum()
-        for i in range(robots):
-            for j in range(i):
-                other = chosen.copy()
-                other[[i, j]] = other[[j, i]]
-                assert ways[np.arange(robots), other].sum() >= total - 1e-3
 
 
 def in_double_precision(network: Network, rows: FloatArray) -> npt.NDArray[np.float64]:
