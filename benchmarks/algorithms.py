@@ -3,6 +3,9 @@
 Writes a row of benchmarks/algorithms.csv for each run. Runs with a row are skipped and interrupted ones resume.
 
     python benchmarks/algorithms.py --algorithm ppo sac --scenario smart --seed 1
+
+Those of other libraries, ``recurrent-ppo`` of sb3-contrib and ``qmix`` of BenchMARL, need the environment that
+``make recipes`` makes: ``.venv-recipes/bin/python benchmarks/algorithms.py --algorithm qmix --safeguard False``.
 """
 
 from __future__ import annotations
@@ -13,10 +16,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import tyro
 from rich.console import Console
 
-from posse_baselines import load
+import posse
+from posse.numeric import FloatArray
+from posse_baselines import Policy, from_function, load
+from posse_baselines.learned import Encoding
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
@@ -25,13 +32,10 @@ from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
-COLUMNS: Final = (
-    *("algorithm", "safeguard", "scenario", "version", "training_seed", "steps", "worlds", "seed"),
-    *("safe_score", "low", "high", "score", "contact_free", "steps_per_second", "commit"),
-)
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 NAMES: Final = ("algorithm", "safeguard", "scenario", "training_seed")
-OFF_POLICY: Final = ("sac", "td3")
+SLOW: Final = ("sac", "td3", "qmix", "recurrent-ppo")
+WIDTHS: Final = (128, 128)
 TEST_SEED: Final = 7
 
 
@@ -46,8 +50,8 @@ class Settings:
     seed: tuple[int, ...] = (1, 2, 3)
     steps: int = 20_000_000
     """Steps of training; a step is one control step of one tracker."""
-    off_policy_steps: int = 1_000_000
-    """The same for sac and td3, whose steps take longer."""
+    slow_steps: int = 1_000_000
+    """The same for those whose steps take longer: all but ppo and mappo."""
     worlds: int = 500
     """Worlds of the split ``test`` that the last policy plays."""
     out: Path = Path("runs/algorithms")
@@ -55,28 +59,67 @@ class Settings:
 
 def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, seed: int) -> TrainSettings:
     """Return the settings of one run."""
-    steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
+    steps = s.slow_steps if algorithm in SLOW else s.steps
     folder = s.out / f"{algorithm}-{'safe' if safeguard else 'bare'}-{scenario}-{seed}"
+    base = default_settings(scenario, "ppo" if algorithm in ("qmix", "recurrent-ppo") else algorithm, preset="nothing")
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
-    run["hidden"] = (128, 128)  # of all algorithms alike
-    base = default_settings(scenario, algorithm, preset="nothing")
-    return replace(base, **run, safeguard=safeguard, tensorboard=False, beside=None)
+    return replace(base, **run, hidden=WIDTHS, safeguard=safeguard, tensorboard=False, beside=None)
 
 
-def row_of(run: TrainSettings, worlds: int) -> dict[str, Any]:
-    """Return the row of a finished run: its last policy on test worlds."""
-    policy = load(str(run.run_folder / LAST))
-    card: dict[str, Any] = policy.card  # type: ignore[attr-defined]
-    results = evaluate(policy, run.scenario, worlds, TEST_SEED, split="test", progress=False)
-    safe, last = mean(results["safe_score"]), card["curve"][-1]
-    numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean())
-    values = (
-        *(run.algorithm, run.safeguard, run.scenario, results.scenario.version),
-        *(run.seed, card["steps"], worlds, TEST_SEED),
-        *(f"{number:.6f}" for number in numbers),
-        *(round(last["steps"] / last["seconds"]), commit()),
-    )
-    return dict(zip(COLUMNS, values, strict=True))
+def trained(algorithm: str, run: TrainSettings) -> Policy:
+    """Train; return the last policy."""
+    if algorithm == "qmix":
+        return qmix(run)
+    if algorithm == "recurrent-ppo":
+        return recurrent_ppo(run)
+    train(run, console=Console())
+    return load(str(run.run_folder / LAST))
+
+
+def recurrent_ppo(run: TrainSettings) -> Policy:
+    """Train an LSTM of sb3-contrib with the settings of ``ppo``, in whole sequences of a rollout."""
+    from sb3_contrib import RecurrentPPO
+
+    from posse_training.sb3 import TeamVecEnv, from_sb3
+
+    batch = posse.batch(run.scenario, run.num_worlds, seed=run.seed, split="train", autoreset="disabled")
+    encoding = Encoding.of(batch.layout, run.encoding)
+    env = TeamVecEnv([batch], encoding, safeguard=run.safeguard)
+    network = {"net_arch": list(run.hidden), "lstm_hidden_size": 128, "log_std_init": run.log_deviation}
+    how: dict[str, Any] = {
+        "n_steps": run.rollout,
+        "batch_size": run.minibatch,
+        "n_epochs": run.epochs,
+        "seed": run.seed,
+    }
+    model = RecurrentPPO("MlpLstmPolicy", env, run.learning_rate, policy_kwargs=network, device="cpu", **how)
+    return from_sb3(model.learn(run.steps), encoding=encoding, safeguard=run.safeguard)
+
+
+def qmix(run: TrainSettings) -> Policy:
+    """Train QMIX with BenchMARL's defaults: it reads plain observations and chooses among discrete motions."""
+    import torch
+    from benchmarl.algorithms import QmixConfig
+    from benchmarl.experiment import Experiment, ExperimentConfig
+    from benchmarl.models.mlp import MlpConfig
+    from tensordict import TensorDict
+    from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+    from posse_training.benchmarl import PosseTask
+
+    config = ExperimentConfig.get_from_yaml()
+    config.max_n_frames = run.steps // posse.get_scenario(run.scenario).num_trackers
+    config.evaluation, config.loggers = False, []
+    task, models = getattr(PosseTask, run.scenario.upper()).get_from_yaml(), MlpConfig.get_from_yaml()
+    experiment = Experiment(task, QmixConfig.get_from_yaml(), models, seed=run.seed, config=config)
+    experiment.run()
+
+    def best_motions(observations: FloatArray) -> FloatArray:
+        data = TensorDict({"agents": {"observation": torch.from_numpy(observations)}}, len(observations))
+        with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+            return np.asarray(experiment.policy(data)["agents", "action"])
+
+    return from_function(best_motions, name="qmix", discrete_actions=True)
 
 
 def main() -> None:
@@ -84,15 +127,20 @@ def main() -> None:
     s = tyro.cli(Settings, description=__doc__)
     with TABLE.open(newline="", encoding="utf-8") as file:
         done = {tuple(row[name] for name in NAMES) for row in csv.DictReader(file)}
-    console = Console()
     for seed, scenario, safeguard, algorithm in itertools.product(s.seed, s.scenario, s.safeguard, s.algorithm):
         if (algorithm, str(safeguard), scenario, str(seed)) in done:
             continue
         run = settings_of(s, algorithm, safeguard, scenario, seed)
-        train(run, console=console)
-        row = row_of(run, s.worlds)
+        results = evaluate(trained(algorithm, run), scenario, s.worlds, TEST_SEED, split="test", progress=False)
+        safe = mean(results["safe_score"])
+        numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean())
+        values = (
+            *(algorithm, safeguard, scenario, results.scenario.version, seed, run.steps, s.worlds, TEST_SEED),
+            *(f"{number:.6f}" for number in numbers),
+            commit(),
+        )
         with TABLE.open("a", newline="", encoding="utf-8") as file:
-            csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(row)
+            csv.writer(file, lineterminator="\n").writerow(values)
 
 
 if __name__ == "__main__":
