@@ -23,13 +23,13 @@ from rich.console import Console
 import posse
 from posse.numeric import FloatArray
 from posse_baselines import Policy, from_function, load
-from posse_baselines.learned import Encoding
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
+from posse_training.train.worlds import make_env
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
@@ -77,23 +77,17 @@ def trained(algorithm: str, run: TrainSettings) -> Policy:
 
 
 def recurrent_ppo(run: TrainSettings) -> Policy:
-    """Train an LSTM of sb3-contrib with the settings of ``ppo``, in whole sequences of a rollout."""
+    """Train an LSTM of sb3-contrib in the worlds of ``ppo`` and with its settings, at a constant learning rate."""
     from sb3_contrib import RecurrentPPO
 
-    from posse_training.sb3 import TeamVecEnv, from_sb3
+    from posse_training.sb3 import from_sb3
 
-    batch = posse.batch(run.scenario, run.num_worlds, seed=run.seed, split="train", autoreset="disabled")
-    encoding = Encoding.of(batch.layout, run.encoding)
-    env = TeamVecEnv([batch], encoding, safeguard=run.safeguard)
-    network = {"net_arch": list(run.hidden), "lstm_hidden_size": 128, "log_std_init": run.log_deviation}
-    how: dict[str, Any] = {
-        "n_steps": run.rollout,
-        "batch_size": run.minibatch,
-        "n_epochs": run.epochs,
-        "seed": run.seed,
-    }
-    model = RecurrentPPO("MlpLstmPolicy", env, run.learning_rate, policy_kwargs=network, device="cpu", **how)
-    return from_sb3(model.learn(run.steps), encoding=encoding, safeguard=run.safeguard)
+    env = make_env(run)
+    network = {"net_arch": list(run.hidden), "lstm_hidden_size": run.hidden[0], "log_std_init": run.log_deviation}
+    how: dict[str, Any] = {"n_steps": run.rollout, "batch_size": run.minibatch, "n_epochs": run.epochs}
+    how |= {"policy_kwargs": network, "seed": run.seed, "device": "cpu"}
+    model = RecurrentPPO("MlpLstmPolicy", env, run.learning_rate, **how).learn(run.steps)
+    return from_sb3(model, encoding=env.encoding, safeguard=run.safeguard)
 
 
 def qmix(run: TrainSettings) -> Policy:
