@@ -34,7 +34,7 @@ from posse_training.train.worlds import make_env
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 NAMES: Final = ("algorithm", "safeguard", "scenario", "training_seed")
-SLOW: Final = ("sac", "td3", "qmix", "recurrent-ppo")
+OFF_POLICY: Final = ("sac", "td3", "qmix")
 WIDTHS: Final = (128, 128)
 TEST_SEED: Final = 7
 
@@ -50,8 +50,8 @@ class Settings:
     seed: tuple[int, ...] = (1, 2, 3)
     steps: int = 20_000_000
     """Steps of training; a step is one control step of one tracker."""
-    slow_steps: int = 1_000_000
-    """The same for those whose steps take longer: all but ppo and mappo."""
+    off_policy_steps: int = 1_000_000
+    """The same for sac, td3 and qmix, whose steps take longer."""
     worlds: int = 500
     """Worlds of the split ``test`` that the last policy plays."""
     out: Path = Path("runs/algorithms")
@@ -59,7 +59,7 @@ class Settings:
 
 def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, seed: int) -> TrainSettings:
     """Return the settings of one run."""
-    steps = s.slow_steps if algorithm in SLOW else s.steps
+    steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
     folder = s.out / f"{algorithm}-{'safe' if safeguard else 'bare'}-{scenario}-{seed}"
     base = default_settings(scenario, "ppo" if algorithm in ("qmix", "recurrent-ppo") else algorithm, preset="nothing")
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
