@@ -63,7 +63,7 @@ def settings_of(s: Settings, algorithm: str, safeguard: bool, scenario: str, see
     folder = s.out / f"{algorithm}-{'safe' if safeguard else 'bare'}-{scenario}-{seed}"
     base = default_settings(scenario, "ppo" if algorithm in ("qmix", "recurrent-ppo") else algorithm, preset="nothing")
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
-    return replace(base, **run, hidden=WIDTHS, safeguard=safeguard, tensorboard=False, beside=None)
+    return replace(base, **run, hidden=WIDTHS, safeguard=safeguard)
 
 
 def trained(algorithm: str, run: TrainSettings) -> Policy:
