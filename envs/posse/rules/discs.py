@@ -115,6 +115,9 @@ def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
 def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Write the positions of all discs: trackers, then the target, then obstacles."""
     n = c.num_trackers
+    # The padding first, so that blocks are read as they were written, without a wait.
+    store(s.x, num_discs(c), eight(FAR))
+    store(s.y, num_discs(c), eight(FAR))
     for block in range(blocks(n + 1)):
         j = WIDTH * block
         pose = Pose(*columns(trackers, j, n, POSE))
@@ -126,8 +129,6 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
         o = obstacles[k]
         j = n + 1 + k
         s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
-    store(s.x, num_discs(c), eight(FAR))
-    store(s.y, num_discs(c), eight(FAR))
 
 
 @compiled

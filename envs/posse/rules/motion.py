@@ -164,6 +164,8 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     step; a robot with something near moves in swept physics steps.
     """
     w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
+    # Some time before it is read, in blocks: what was just written in parts, the processor has to wait for.
+    take_commands(c, w, actions, worlds.command[e], s)
     if c.target_agent != 0:
         action = actions[c.num_trackers]
         share, least = HALF * (action[0] + ONE), c.target_least_speed
@@ -180,7 +182,6 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
             dx, dy, w.heading_cos, w.heading_sin = arc(w.heading_cos, w.heading_sin, w.speed, w.turn_rate, time)
             w.x += dx
             w.y += dy
-    take_commands(c, w, actions, worlds.command[e], s)
     if move_freely(c, trackers, parts, time, s) or w.near != 0:
         move_in_parts(c, w, trackers, obstacles, s)
     w.frame_cos, w.frame_sin = follow_heading(

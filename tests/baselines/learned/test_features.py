@@ -66,15 +66,19 @@ def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.
     return np.ascontiguousarray(rows).view(FEATURES).reshape(observations.shape[:2])
 
 
+def away_from_slots(batch: posse.Batch, features: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+    """How far each slot is from the place that each tracker takes for its own slot, (E, N, N)."""
+    soft = features["slot_far"]  # its length is d / (d + 3)
+    return np.abs(ways_to_slots(batch) - (3.0 * soft / (1 - np.abs(soft)))[..., None])
+
+
 @pytest.mark.parametrize("silent", [False, True])
 def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     batch, observations = observations_of("constant", worlds=8, steps=30)
     views = batch.layout.views(observations)
     if silent:
         views["neighbour_age"][views["neighbour_number"] == 4] = 1.1
-    soft = features_of(batch, observations)["slot_far"]  # its length is d / (d + 3)
-    found = 3.0 * soft / (1 - np.abs(soft))
-    away = np.abs(ways_to_slots(batch) - found[..., None])
+    away = away_from_slots(batch, features_of(batch, observations))
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
     # With a perfect radio all compute the same assignment.
@@ -97,8 +101,7 @@ def test_slots_go_on_turning_after_the_fix() -> None:
     after = ways_to_slots(batch)
     batch.layout.views(observations)["target_age"][...] = 15 * batch.scenario.control_step
     features = features_of(batch, observations)
-    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
-    away = np.abs(after - found[..., None])
+    away = away_from_slots(batch, features)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.01)
     mine = np.take_along_axis(np.stack([before, after]), away.argmin(axis=2)[None, ..., None], axis=-1)[..., 0]
     wish = (mine[1] - mine[0]) / batch.scenario.control_step + 0.8 * mine[1]  # with the law's gain, 1/s
@@ -114,9 +117,7 @@ def test_four_robots_leave_the_slot_in_a_wall(side: int, inside: set[int]) -> No
     observations, *_ = batch.step(rest)
     views = batch.layout.views(observations)
     views["neighbour_age"][views["neighbour_number"] == 4] = 1.1
-    features = features_of(batch, observations)[0, :4]
-    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
-    away = np.abs(ways_to_slots(batch)[0, :4] - found[:, None])
+    away = away_from_slots(batch, features_of(batch, observations))[0, :4]
     np.testing.assert_allclose(away.min(axis=1), 0, atol=0.05)
     assert set(away.argmin(axis=1)) == inside
 
@@ -129,9 +130,8 @@ def slots_without_the_first_robot(**overrides: Any) -> list[int]:
     observations, *_ = batch.step(at_rest(batch))
     views = batch.layout.views(observations)
     views["neighbour_age"][views["neighbour_number"] == 0] = 1.1
-    features = features_of(batch, observations)[0, 1:]
-    found = 3.0 * features["slot_far"] / (1 - np.abs(features["slot_far"]))
-    return [int(k) for k in np.abs(ways_to_slots(batch)[0, 1:] - found[:, None]).argmin(axis=1)]
+    away = away_from_slots(batch, features_of(batch, observations))
+    return [int(k) for k in away[0, 1:].argmin(axis=1)]
 
 
 def test_the_first_slot_is_filled_where_the_target_is_not_in_sight_from_all() -> None:

@@ -113,9 +113,8 @@ def test_the_head_says_what_happened_what_one_sees_and_how_to_make_it_again(
 
 
 def test_in_a_frame_of_another_page_it_plays_with_the_verdict_alone(browser: Browser, tmp_path: Path) -> None:
-    inner = write_replay(
-        short(), tmp_path / "host.html.inner.html"
-    )  # a request for what begins like the page is its own
+    # A request for what begins like the page is its own.
+    inner = write_replay(short(), tmp_path / "host.html.inner.html")
     (tmp_path / "host.html").write_text(f'<html data-ready="yes"><iframe src="{inner.name}" width="600" height="500">')
     with opened(browser, tmp_path / "host.html") as page:
         frame = page.frames[1]
@@ -213,9 +212,8 @@ def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) ->
 def test_the_safe_score_stops_at_the_first_contact(browser: Browser, tmp_path: Path) -> None:
     replay = record(["pursuit", "idle"], "obstacles", world=3, seconds=30, observations=False)
     scores = [player.columns["score"] for player in replay.players]
-    touches = [
-        next((event.step for event in player.events if event.kind == "contact"), 10**6) for player in replay.players
-    ]
+    contacts = ([event.step for event in player.events if event.kind == "contact"] for player in replay.players)
+    touches = [min(steps, default=10**6) for steps in contacts]
     assert touches[0] < 300 < touches[1]
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=28") as page:
         for name, kept in (("score so far", [10**6] * 2), ("safe score so far", touches)):
