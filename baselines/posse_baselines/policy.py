@@ -111,21 +111,14 @@ class BasePolicy:
 
 
 def check_observations(
-    policy: Policy | BasePolicy,
-    observations: npt.ArrayLike,
-    num_worlds: int,
-    layout: ObservationLayout,
-    rows: int | None = None,
+    name: str, observations: npt.ArrayLike, robots: tuple[int, ...], layout: ObservationLayout
 ) -> FloatArray:
-    """Return the observations as kernels take them; PolicyError if they are not (E, rows, F) of a memory's layout.
-
-    There is by default one row for each tracker.
-    """
+    """Return the observations of robots (E, R) as kernels take them; PolicyError if they are not (E, R, F)."""
     array = np.ascontiguousarray(observations, np.float32)
-    wanted = (num_worlds, layout.scenario.num_trackers if rows is None else rows, layout.size)
+    wanted = (*robots, layout.size)
     if array.shape != wanted:
         raise PolicyError(
-            f"policy {policy.name!r} got observations of shape {array.shape}, wanted {wanted}: "
+            f"policy {name!r} got observations of shape {array.shape}, wanted {wanted}: "
             "(worlds, robots it moves, observation length) of the layout that begin() was given"
         )
     return array

@@ -6,14 +6,13 @@ passes unchanged. Of the script only the monitoring of the surroundings, the det
 settings that ``ddcs-tuned`` has for the scenario: without a wanted velocity a robot stays where it is, but for what it
 evades.
 
-:func:`Safeguard` puts the layer before an environment, :class:`Guard` is the layer itself, and :class:`Advice` one with
-the whole script, whose velocities a network corrects.
+:func:`Safeguard` puts the layer before an environment; :class:`Guard` is the layer itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -23,113 +22,36 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, OwnArrays
-from posse_baselines.ddcs import DDCS
+from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
 from posse_baselines.ddcs.memory import Minds
-from posse_baselines.policy import Policy, PolicyError, split_agents, stack_agents
+from posse_baselines.policy import PolicyError, check_observations, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 
-REACH: Final = np.float32(2.0)
-"""Factor of the network's output: spans the whole of [-1, 1] from either end."""
-MOTION: Final = 2
-"""Numbers of an action that move the tracker; a proposal adds as many inputs."""
 
-
-class Guard(OwnArrays):
+class Guard(Minds):
     """The safeguard of R robots in each of E worlds, and what it remembers of their surroundings.
 
     Args:
         layout: Of the observations.
         num_worlds: E.
         robots: R, the robots that it moves; default: all trackers.
-        minds: Memory of the script whose safeguard it is; default: a new one of ``ddcs-tuned``.
-
-    Attributes:
-        minds: Memory of the script.
-        inputs: (E, R, k): what a network reads of it; here nothing, k = 0.
     """
 
-    def __init__(
-        self, layout: ObservationLayout, num_worlds: int, robots: int | None = None, minds: Minds | None = None
-    ) -> None:
+    def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         scenario = layout.scenario
-        robots = scenario.num_trackers if robots is None else robots
-        self.minds = minds or Minds(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots)
-        self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
-        self.inputs = np.zeros((num_worlds, robots, 0), np.float32)
+        super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
 
-    def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
-        """Take the observations (E, R, F) of a control step, in the worlds of a mask (E,) or in all."""
-        worlds = ... if mask is None else mask
-        self._observed[worlds] = observations[worlds]
-
-    def restart(self, mask: BoolArray) -> None:
-        """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
-        self.minds.restart(mask)
-
-    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
+    def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
 
-        Call it once a control step; ValueError if a wanted velocity is not finite.
+        Call it once a control step, with its observations (E, R, F); ValueError if a wanted velocity is not finite.
         """
         actions = np.array(wanted, np.float32, order="C")
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity must be finite")
-        self.minds.run(guard_all, self._observed, actions)
+        self.run(guard_all, check_observations("safeguard", observations, self.me.shape, self.layout), actions)
         return actions
-
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return what it remembers as arrays (E, ...) by name; views, not copies."""
-        return {"observed": self._observed, "inputs": self.inputs, **self.minds.arrays()}
-
-
-def check_adviser(policy: Policy | None) -> int:
-    """Return how many numbers a network reads in addition to its encoding, with an adviser or without.
-
-    PolicyError if the adviser is not a policy of the DDCS.
-    """
-    if policy is None:
-        return 0
-    if not isinstance(policy, DDCS):
-        raise PolicyError(f"{policy.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
-    return MOTION
-
-
-class Advice(Guard):
-    """The safeguard of a scripted adviser, which carries out the velocities of the script as a network corrects them.
-
-    Residual policy learning: at each step the adviser, a team of the DDCS, proposes the velocity that it wants, the
-    network reads the proposal beside its other inputs, and twice its output is added to it, before the safeguard. An
-    output of zero reproduces the adviser, and every velocity stays reachable. The adviser's messages are sent
-    unchanged. References: Silver et al. 2018, Johannink et al. 2019; Alshiekh et al. 2018 (safeguard).
-
-    Args:
-        adviser: A policy of the DDCS.
-        layout: Of the observations.
-        num_worlds: E; their episodes may begin apart.
-    """
-
-    def __init__(self, adviser: Any, layout: ObservationLayout, num_worlds: int) -> None:
-        check_adviser(adviser)
-        super().__init__(layout, num_worlds, minds=adviser.begin(layout, num_worlds))
-        self.inputs = np.zeros((*self.minds.me.shape, MOTION), np.float32)
-        self._adviser = adviser
-
-    def follow(self, observations: FloatArray, mask: BoolArray | None = None) -> None:
-        """Ask for advice on the observations (E, N, F) of a control step, in the worlds of a mask (E,) or in all."""
-        kept = {} if mask is None else {name: array[~mask] for name, array in self.arrays().items()}
-        super().follow(observations)
-        self.inputs[...], _ = self._adviser.propose(self._observed, self.minds)
-        for name, array in self.arrays().items():
-            if mask is not None:
-                array[~mask] = kept[name]
-
-    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2), corrections of what is wanted."""
-        outputs = np.asarray(wanted)[..., :MOTION]
-        actions, _ = self._adviser.carry_out(self._observed, self.minds, REACH * outputs)
-        return np.asarray(actions)
 
 
 def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
@@ -165,17 +87,16 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
-        rows = np.atleast_2d(observation)
-        self._guard = Guard(self.get_wrapper_attr("layout"), 1, len(rows))
-        self._guard.follow(rows[None])
+        self._seen = np.array(observation, ndmin=3)
+        self._guard = Guard(self.get_wrapper_attr("layout"), 1, self._seen.shape[1])
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Advance by one control step with wanted velocities."""
         wanted = np.asarray(action, np.float32)
-        motion = self._guard.actions(np.atleast_2d(wanted)[None])
+        motion = self._guard.actions(self._seen, np.array(wanted, ndmin=3))
         observation, *rest = self.env.step(motion.reshape(wanted.shape))
-        self._guard.follow(np.atleast_2d(observation)[None])
+        self._seen = np.array(observation, ndmin=3)
         return observation, *rest
 
 
@@ -190,13 +111,12 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
         observations, infos = self.env.reset(seed=seed, options=options)
-        self._guard = Guard(self.env.unwrapped.layout, 1)
-        self._guard.follow(stack_agents(observations))
+        self._seen, self._guard = stack_agents(observations), Guard(self.env.unwrapped.layout, 1)
         return observations, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        motions = self._guard.actions(stack_agents(actions))
+        motions = self._guard.actions(self._seen, stack_agents(actions))
         result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **split_agents(motions, actions)})
-        self._guard.follow(stack_agents(result[0]))
+        self._seen = stack_agents(result[0])
         return result

@@ -51,8 +51,7 @@ def full_speed(settings: dict[str, Any], safe: bool) -> tuple[float, float]:
     for _ in range(100):
         wanted = np.ones((20, s.num_trackers)) if s.walled else opposite - points(batch, "tracker")
         wanted = wanted / np.maximum(np.abs(wanted), 1e-6) / directions(batch, "tracker")
-        guard.follow(observations)
-        actions = guard.actions(np.stack([wanted.real, wanted.imag], axis=-1).astype(np.float32))
+        actions = guard.actions(observations, np.stack([wanted.real, wanted.imag], axis=-1).astype(np.float32))
         if not safe:
             turn = np.angle(wanted) / (s.control_step * s.tracker_turn_rates[0])
             actions = np.stack([2 * np.maximum(wanted.real, 0) - 1, turn], axis=-1).clip(-1, 1)
@@ -82,9 +81,9 @@ def test_it_gets_past_a_wide_obstacle(aside: float) -> None:
     batch.arrays.obstacle["radius"] = 0.6
     observations, guard = batch.observe(), Guard(batch.layout, 1)
     for _ in range(120):
-        guard.follow(observations)
         towards = np.conj(directions(batch, "tracker"))  # along the x axis
-        observations, *_ = batch.step(guard.actions(np.stack([towards.real, towards.imag], axis=-1).astype(np.float32)))
+        wanted = np.stack([towards.real, towards.imag], axis=-1)
+        observations, *_ = batch.step(guard.actions(observations, wanted))
     assert batch.state["tracker_x"][0, 0] > 2.0
     assert batch.metrics()["contact_free"][0] == 1.0
 
@@ -95,8 +94,7 @@ def test_a_resting_robot_gives_way_to_what_comes_at_it(heading: float) -> None:
     options = {"tracker_pose": [[0.0, 0.0, heading]], "target_pose": [-4.0, 0.0, 0.0]}
     observations, guard = batch.reset(options=options), Guard(batch.layout, 1)
     for _ in range(100):
-        guard.follow(observations)
-        observations, *_ = batch.step(guard.actions(np.zeros(batch.action_shape, np.float32)))
+        observations, *_ = batch.step(guard.actions(observations, np.zeros(batch.action_shape, np.float32)))
     assert batch.state["world_x"][0] > 1.5
     assert batch.metrics()["contact_free"][0] == 1.0
 
@@ -109,9 +107,8 @@ def test_it_foresees_commands_that_act_late() -> None:
     errors = []
     for _ in range(60):
         heading = directions(batch, "tracker")
-        guard.follow(observations)
         along = 0.5 * np.stack([heading.real, -heading.imag], axis=-1)  # the common x axis
-        observations, *_ = batch.step(guard.actions(along.astype(np.float32)))
+        observations, *_ = batch.step(guard.actions(observations, along.astype(np.float32)))
         errors.append(np.abs(np.angle(heading)))
     assert np.median(errors[0]) > 0.5
     assert np.quantile(errors[40:], 0.9) < 0.05
@@ -129,8 +126,7 @@ def test_environments_do_as_the_batch_does() -> None:
         seen_each, _ = parallel.reset()
         for _ in range(30):
             wanted = generator.uniform(-1, 1, (5, 3)).astype(np.float32)
-            guard.follow(seen)
-            seen, *_ = batch.step(guard.actions(wanted[None]))
+            seen, *_ = batch.step(guard.actions(seen, wanted[None]))
             seen_team, *_ = team.step(wanted)
             seen_each, *_ = parallel.step({f"tracker_{i}": wanted[i] for i in range(5)})
             np.testing.assert_array_equal(seen[0], seen_team)
@@ -164,7 +160,7 @@ def test_invalid_environments_are_not_guarded() -> None:
         Safeguard(3)
     batch = posse.batch("smart", 1)
     with pytest.raises(ValueError, match="finite"):
-        Guard(batch.layout, 1).actions(np.full((1, 5, 2), np.nan))
+        Guard(batch.layout, 1).actions(batch.reset(), np.full((1, 5, 2), np.nan))
 
 
 @pytest.mark.parametrize("turn", [1.5, 0.0, -1.5])

@@ -69,8 +69,7 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
     actions = outputs_of(policy, rows, tmp_path).reshape(wanted.shape)
     if safeguard:
         guard = Guard(batch.layout, 6)
-        guard.follow(observations)
-        actions = guard.actions(actions)
+        actions = guard.actions(observations, actions)
     np.testing.assert_allclose(actions, wanted, rtol=0, atol=1e-5)
 
 

@@ -22,11 +22,11 @@ import numpy.typing as npt
 
 from posse.numeric import FloatArray
 from posse.scenarios.family import blocks
-from posse_baselines import Policy, batch_for, load, rollout
+from posse_baselines import batch_for, load, rollout
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
-from posse_baselines.safeguard import MOTION, check_adviser
+from posse_baselines.learned.policy import MOTION
 from posse_training.errors import require
 from posse_training.files import hold_settings, intact
 from posse_training.provenance import software
@@ -102,17 +102,9 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     return folder / BEST
 
 
-def adviser_of(settings: TrainSettings) -> Policy | None:
-    """Return the script that a run corrects, if any.
-
-    Raises:
-        PolicyError: A policy that cannot be an adviser.
-    """
-    if settings.advise is None:
-        return None
-    adviser = load(settings.advise)
-    check_adviser(adviser)
-    return adviser
+def check_adviser(settings: TrainSettings) -> None:
+    """Raise PolicyError if the script that a run corrects cannot be an adviser."""
+    Candidates(settings, np.zeros_like(_basis(settings)[:1]), {})
 
 
 class Candidates(LearnedPolicy):
@@ -129,7 +121,8 @@ class Candidates(LearnedPolicy):
         zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
         network = Network(zeros, ones, LIMIT, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
         encoding = Encoding(settings.encoding, 0, ())
-        super().__init__(network, encoding, card, adviser_of(settings), settings.safeguard)
+        adviser = None if settings.advise is None else load(settings.advise)
+        super().__init__(network, encoding, card, adviser, settings.safeguard)
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         if len(self._weights) == 1:

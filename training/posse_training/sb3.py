@@ -105,7 +105,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F)."""
         layout, worlds, encoder, guard, states, begins = memory
-        seen = check_observations(self, observations, worlds, layout)
+        seen = check_observations(self.name, observations, (worlds, layout.scenario.num_trackers), layout)
         trackers = seen.shape[1]
         if encoder is not None:
             seen = encoder.encode(seen)
@@ -118,6 +118,5 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         actions = np.zeros((worlds, trackers, 2 + layout.scenario.message_size), np.float32)
         actions[..., : motions.shape[-1]] = motions
         if guard is not None:
-            guard.follow(observations)
-            actions = guard.actions(actions)
+            actions = guard.actions(observations, actions)
         return actions, (layout, worlds, encoder, guard, states, np.zeros_like(begins))

@@ -154,7 +154,7 @@ class PosseEnv(EnvBase):
         observations = self.batch.reset(seed=seed, options=options)
         if self._guard is not None:
             self._guard.restart(mask)
-            self._guard.follow(observations[:, self._rows[TRACKERS]])
+        self._seen = observations[:, self._rows[TRACKERS]]
         return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -170,11 +170,10 @@ class PosseEnv(EnvBase):
             together = self._motions[together]
         actions_of_all = together.detach().cpu().numpy()
         if self._guard is not None:
-            motions = self._guard.actions(actions_of_all[:, self._rows[TRACKERS]])
+            motions = self._guard.actions(self._seen, actions_of_all[:, self._rows[TRACKERS]])
             actions_of_all = np.concatenate([motions, actions_of_all[:, motions.shape[1] :]], axis=1)
         observations, rewards, *_ = self.batch.step(actions_of_all)
-        if self._guard is not None:
-            self._guard.follow(observations[:, self._rows[TRACKERS]])
+        self._seen = observations[:, self._rows[TRACKERS]]
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)
         for group, part in self._rows.items():

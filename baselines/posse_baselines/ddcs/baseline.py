@@ -151,7 +151,7 @@ class DDCS(OwnArrays, BasePolicy):
         return self._run(carry_out_all, observations, memory, actions), memory
 
     def _run(self, kernel: Kernel, observations: FloatArray, memory: Memory, out: FloatArray) -> FloatArray:
-        memory.run(kernel, check_observations(self, observations, len(memory.me), memory.layout), out)
+        memory.run(kernel, check_observations(self.name, observations, memory.me.shape, memory.layout), out)
         return out
 
     def annotations(self, memory: Memory) -> Annotations:

@@ -22,17 +22,21 @@ from posse import ObservationLayout
 from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
+from posse_baselines.ddcs import DDCS
 from posse_baselines.files import write_atomically
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
-from posse_baselines.safeguard import MOTION, Advice, Guard, check_adviser
+from posse_baselines.safeguard import Guard
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
 SIDES: Final = ("trackers", "target")
 """What a policy moves."""
+MOTION: Final = 2
+"""Numbers of an action that move the robot; an adviser's proposal adds as many inputs."""
+_REACH: Final = np.float32(2.0)  # times the output, a correction spans all velocities from either end
 _KEY: Final = "posse-policy"
 
 
@@ -40,11 +44,9 @@ class _Memory(NamedTuple):
     """What a learned policy remembers of its worlds."""
 
     layout: ObservationLayout
-    num_worlds: int
-    robots: int
     encoder: Encoder
-    layer: Guard | None
-    """What makes the robots' actions of the network's."""
+    minds: Any
+    """Of the adviser, or the :class:`~posse_baselines.safeguard.Guard`; ``None``: of neither."""
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -54,8 +56,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         network: Computes the actions.
         encoding: The network's inputs.
         card: Describes the policy: ``name``, ``side``, ``trained_splits``, and anything else on record.
-        adviser: Scripted policy whose wanted velocity the network corrects, if any
-            (:class:`posse_baselines.safeguard.Advice`).
+        adviser: Team of the DDCS whose wanted velocity the network corrects, if any (residual policy learning: Silver
+            et al. 2018, Johannink et al. 2019). The network reads the velocity as well, and twice its output is added
+            to it, before the adviser's safeguard (Alshiekh et al. 2018): zeros give the adviser, and every velocity
+            stays reachable. The adviser sends its own messages.
         safeguard: Whether its actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
 
@@ -75,7 +79,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Policy | None = None,
         safeguard: bool = False,
     ) -> None:
-        size = encoding.size + check_adviser(adviser)
+        if adviser is not None and not isinstance(adviser, DDCS):
+            raise PolicyError(f"{adviser.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
+        size = encoding.size + (0 if adviser is None else MOTION)
         most = MOTION if adviser is not None else network.outputs  # an adviser sends its own messages
         if network.inputs != size or not MOTION <= network.outputs <= most:
             raise PolicyError(
@@ -109,11 +115,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` worlds; PolicyError if the layout lacks a field that is read."""
         super().begin(layout, num_worlds)
+        minds = self.adviser.begin(layout, num_worlds) if self.adviser else None
+        minds = Guard(layout, num_worlds) if self.safeguard else minds
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        layer = Guard(layout, num_worlds) if self.safeguard else None
-        if self.adviser is not None:
-            layer = Advice(self.adviser, layout, num_worlds)
-        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout, num_worlds, robots), layer)
+        return _Memory(layout, Encoder(self.encoding, layout, num_worlds, robots), minds)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -121,15 +126,17 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         One that moves the target takes (E, 1, F).
         """
         m: _Memory = memory
-        observations = check_observations(self, observations, m.num_worlds, m.layout, m.robots)
+        observations = check_observations(self.name, observations, m.encoder.estimates.shape, m.layout)
         inputs = m.encoder.encode(observations)
-        if m.layer is not None:
-            m.layer.follow(observations)
-            inputs = np.concatenate([inputs, m.layer.inputs.reshape(len(inputs), -1)], axis=1)
+        if self.adviser is not None:
+            proposals, _ = self.adviser.propose(observations, m.minds)
+            inputs = np.concatenate([inputs, proposals.reshape(len(inputs), MOTION)], axis=1)
         outputs = self._forward(inputs).reshape(*observations.shape[:2], -1)
+        if self.adviser is not None:
+            return self.adviser.carry_out(observations, m.minds, _REACH * outputs)[0], m
         actions = np.zeros((*outputs.shape[:2], MOTION + m.layout.scenario.message_size), np.float32)
         actions[..., : outputs.shape[2]] = outputs
-        return actions if m.layer is None else m.layer.actions(actions), m
+        return m.minds.actions(observations, actions) if self.safeguard else actions, m
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         """Return the outputs of the network (E N, 2 + m) for its inputs."""
@@ -138,17 +145,17 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with encoder, adviser and safeguard restarted in the worlds of a mask (E,)."""
         memory.encoder.restart(mask)
-        if memory.layer is not None:
-            memory.layer.restart(mask)
+        if memory.minds is not None:
+            memory.minds.restart(mask)
         return memory
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the memory of encoder, adviser and safeguard as arrays by name; views, not copies."""
-        return {**memory.encoder.arrays(), **({} if memory.layer is None else memory.layer.arrays())}
+        return {**memory.encoder.arrays(), **({} if memory.minds is None else memory.minds.arrays())}
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
-        return {} if self.adviser is None else self.adviser.annotations(memory.layer.minds)
+        return {} if self.adviser is None else self.adviser.annotations(memory.minds)
 
     def description(self) -> dict[str, Any]:
         """Return what its file says beside the tensors, as plain values."""

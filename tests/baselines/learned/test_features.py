@@ -69,7 +69,7 @@ def features_of(batch: posse.Batch, observations: FloatArray) -> npt.NDArray[np.
 def away_from_slots(batch: posse.Batch, features: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
     """How far each slot is from the place that each tracker takes for its own slot, (E, N, N)."""
     soft = features["slot_far"]  # its length is d / (d + 3)
-    return np.abs(ways_to_slots(batch) - (3.0 * soft / (1 - np.abs(soft)))[..., None])
+    return np.asarray(np.abs(ways_to_slots(batch) - (3.0 * soft / (1 - np.abs(soft)))[..., None]))
 
 
 @pytest.mark.parametrize("silent", [False, True])

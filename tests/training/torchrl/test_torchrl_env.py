@@ -81,8 +81,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     guard = Guard(batch.layout, WORLDS)
     carried, seen = env.reset(), batch.reset()
     for wanted in some_actions(batch.action_shape, 30):
-        guard.follow(seen)
-        seen, _, _, truncated, _ = batch.step(guard.actions(wanted))
+        seen, _, _, truncated, _ = batch.step(guard.actions(seen, wanted))
         following, carried = env.step_and_maybe_reset(act(carried, wanted))
         np.testing.assert_array_equal(following["next", "agents", "observation"].numpy(), seen)
         if truncated.any():

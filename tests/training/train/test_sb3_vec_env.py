@@ -77,8 +77,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     for _ in range(2 * HORIZON):
         wanted = draw(env, generator)
         observations, _, dones, _ = move(env, wanted)
-        guard.follow(seen)
-        seen, *_ = bare.step(guard.actions(wanted.reshape(3, 5, 2)))
+        seen, *_ = bare.step(guard.actions(seen, wanted.reshape(3, 5, 2)))
         if dones.any():
             seen = bare.reset(options={"reset_mask": np.ones(3, np.bool_)})
             guard.restart(np.ones(3, np.bool_))

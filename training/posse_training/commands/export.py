@@ -13,8 +13,8 @@ import tyro
 
 from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.policy import MOTION
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
-from posse_baselines.safeguard import MOTION
 from posse_training.errors import SettingsError, require
 
 _OPSET: Final = 13

@@ -16,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
-from posse_training.evolution import adviser_of, evolve
+from posse_training.evolution import check_adviser, evolve
 from posse_training.files import hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
@@ -97,7 +97,7 @@ def check_before(settings: TrainSettings) -> None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
     check_algorithm(settings)
     if settings.algorithm == EVOLUTION:
-        adviser_of(settings)
+        check_adviser(settings)
     pairings(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:

@@ -181,8 +181,9 @@ class SlotGroup:
         self.size = encoding.size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
         self._state = state
-        # What makes the robots' actions of the model's.
-        self._layer = Guard(batch.layout, worlds) if safeguard else None
+        # What makes the robots' actions of the model's, and the observations that it reads.
+        self._guard = Guard(batch.layout, worlds) if safeguard else None
+        self._seen = np.zeros(batch.observation_shape, np.float32)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
         # Rewards of the present episode so far, (E, N).
@@ -192,16 +193,16 @@ class SlotGroup:
         """Start a shortened episode in every world; return the observations (slots, size)."""
         raw = self.batch.reset(seed=seed)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
-        self._begin(raw, np.ones(worlds, np.bool_))
+        self._begin(np.ones(worlds, np.bool_))
+        self._seen[...] = raw
         self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
         return self.encode(raw)
 
-    def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
-        """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
+    def _begin(self, mask: BoolArray) -> None:
+        """Begin an episode in the worlds of a mask (E,)."""
         self._encoder.restart(mask)
-        if self._layer is not None:
-            self._layer.restart(mask)
-            self._layer.follow(raw, mask)
+        if self._guard is not None:
+            self._guard.restart(mask)
         self._returns[mask] = 0
         self._cut_at[mask] = _NEVER
 
@@ -211,19 +212,18 @@ class SlotGroup:
         """Step every world; return observations, rewards, dones and infos, one row a slot, and the reward's terms."""
         batch = self.batch
         actions = actions.reshape(*batch.action_shape[:2], -1)
-        if self._layer is not None:
-            actions = self._layer.actions(actions)
+        if self._guard is not None:
+            actions = self._guard.actions(self._seen, actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
-        if self._layer is not None:
-            self._layer.follow(raw)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_slots)]
         if ended.any():
             self._report(raw, ended, terminated, over, infos)
             raw = batch.reset(options={"reset_mask": ended})
-            self._begin(raw, ended)
+            self._begin(ended)
+        self._seen[...] = raw
         terms = {name: told[f"reward/{name}"] for name in batch.term_names}
         return self.encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
 
@@ -267,9 +267,8 @@ class SlotGroup:
         """Return every array by name; views, not copies, without padding between fields."""
         own = {**self.batch.arrays.by_name(), **self._encoder.arrays()}
         own |= {"cut_at": self._cut_at, "returns": self._returns}
-        if self._layer is not None:
-            kind = type(self._layer).__name__.lower()
-            own |= {f"{kind}.{name}": array for name, array in self._layer.arrays().items()}
+        if self._guard is not None:
+            own |= {"seen": self._seen, **self._guard.arrays()}
         if isinstance(self.batch, PairedBatch):  # the memory of the policy inside
             inside: Any = self.batch.inside
             own |= {f"opponent.{name}": array for name, array in inside.arrays(self.batch.memory).items()}
