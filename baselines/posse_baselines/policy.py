@@ -27,7 +27,6 @@ Memory = Any
 """What a policy remembers of its worlds; opaque to all but the policy."""
 Annotations = dict[str, npt.NDArray[Any]]
 """Internal quantities of the trackers by name, (E, N) or (E, N, k), for drawing and tests."""
-Function = Callable[[FloatArray], npt.ArrayLike]
 
 
 class PolicyError(ValueError):
@@ -43,7 +42,7 @@ class Policy(Protocol):
         message_size: Numbers that it adds to each broadcast; the scenario's ``message_size`` must
             be at least that.
         reads_state: Whether it reads the state of the worlds, which no tracker observes. Such a
-            policy is a reference, and needs access to the batch (:func:`begin` provides it).
+            policy is a reference; :func:`begin` shows it the batch by its method ``watch(batch)``.
     """
 
     name: str
@@ -67,15 +66,6 @@ class Policy(Protocol):
         ...
 
 
-@runtime_checkable
-class StateReader(Policy, Protocol):
-    """A policy that reads the state of the worlds."""
-
-    def watch(self, batch: Batch) -> None:
-        """Set the batch whose state is read from now on."""
-        ...
-
-
 class BasePolicy:
     """Defaults of most policies: no memory beyond the layout, no messages, no annotations."""
 
@@ -96,6 +86,8 @@ class BasePolicy:
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with the worlds of a mask (E,) restarted."""
+        if hasattr(memory, "restart"):
+            memory.restart(mask)
         return memory
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -104,7 +96,7 @@ class BasePolicy:
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the memory as arrays (E, ...) by name; views, not copies."""
-        return {}
+        return memory.arrays() if hasattr(memory, "arrays") else {}
 
     def __repr__(self) -> str:
         return f"<policy {self.name!r}>"
@@ -126,7 +118,7 @@ def check_observations(
 
 def begin(policy: Policy, batch: Batch) -> Memory:
     """Return the memory of a policy for a batch; a policy with ``reads_state = True`` first gets the batch."""
-    if policy.reads_state and isinstance(policy, StateReader):
+    if policy.reads_state and hasattr(policy, "watch"):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
 
@@ -144,7 +136,12 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
     """
 
     def __init__(
-        self, function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
+        self,
+        function: Callable[[FloatArray], npt.ArrayLike],
+        *,
+        name: str | None = None,
+        message_size: int = 0,
+        discrete_actions: bool = False,
     ) -> None:
         self.name = getattr(function, "__name__", "function") if name is None else name
         self.message_size = message_size

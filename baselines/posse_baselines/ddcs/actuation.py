@@ -18,7 +18,7 @@ import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, is_due, since
-from posse_baselines.ddcs.monitoring import mate_now, patience, target_after
+from posse_baselines.ddcs.monitoring import target_after
 from posse_baselines.ddcs.settings import FLOCKING
 from posse_baselines.laws.geometry import clip, cross, dot, length, scaled, unit, vector
 from posse_baselines.laws.guidance import regulate, write_motion
@@ -47,19 +47,13 @@ _SIDE_KEPT: Final = 1.5  # s
 
 
 @compiled
-def when_observed(team: Team, me: Record, place: complex, velocity: complex) -> complex:
-    """Return the way to what is ``place`` (m) off when the command is executed, as it was when the sonar measured."""
-    way: complex = place - scaled(velocity, team.world.lead) + me.moved
-    return way
-
-
-@compiled
 def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading: float) -> bool:
     """Return whether one of the known robots (discs), or a wall, explains a sonar reading (m) along a beam."""
     world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(len(robots)):
-        place = when_observed(team, me, robots[j].place, robots[j].velocity)
+        # As it was when the sonar measured.
+        place = robots[j].place - scaled(robots[j].velocity, world.lead) + me.moved
         square = dot(place, place)
         if square > reach * reach:
             continue
@@ -86,7 +80,7 @@ def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     for k in range(len(team.slots)):
         arm = team.slots[k] * me.frame
         velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
-        way = when_observed(team, me, me.target + arm - me.position, velocity)
+        way = me.target + arm - me.position - scaled(velocity, team.world.lead) + me.moved
         distance = length(way)
         fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
         if fits and dot(way, beam) >= team.world.wide_beam * distance:
@@ -113,10 +107,9 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         age = since(team, me, mate.step)
         if mate.step < 0 or age > _FORGOTTEN:
             continue
-        position, velocity = mate_now(team, me, mate)
-        way = position - me.position
+        way, velocity = mate.place - me.position, complex(mate.velocity) if age <= me.patience else 0j
         # If it were still there after a silence, it would have a place in the observation.
-        if not (world.unlisted and age > patience(team, me) and length(way) < me.horizon):
+        if not (world.unlisted and age > me.patience and length(way) < me.horizon):
             margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
             count = put_near(discs, count, way, velocity, two, margin)
     robots = count

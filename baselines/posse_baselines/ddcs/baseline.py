@@ -29,13 +29,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled
+from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
 from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, read_body, unit_of
-from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, update_mates, watch_target, write_message
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, place_mates, update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, SEARCHING, Settings
@@ -75,7 +74,7 @@ FAMILY: Final[dict[str, Settings]] = {
 """The members of the DDCS family, the baseline first."""
 
 
-class DDCS(OwnArrays, BasePolicy):
+class DDCS(BasePolicy):
     """Three layers, four tasks, from observations and messages alone.
 
     Args:
@@ -122,11 +121,6 @@ class DDCS(OwnArrays, BasePolicy):
         scenario = layout.scenario
         return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
 
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Reset the memory of the worlds of a mask (E,)."""
-        memory.restart(mask)
-        return memory
-
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) of every team: :meth:`propose`, then :meth:`carry_out`."""
         proposals, memory = self.propose(observations, memory)
@@ -171,11 +165,6 @@ class DDCS(OwnArrays, BasePolicy):
         notes["estimate_age"] = np.where(me["known"] != 0, me["fix_age"], np.float32(-1.0))
         return notes
 
-    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the trackers' memory, field by field, as views."""
-        arrays: dict[str, npt.NDArray[Any]] = memory.arrays()
-        return arrays
-
 
 @compiled
 def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
@@ -191,6 +180,7 @@ def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
     monitor(team, me, mates, row)
     look_around(team, me, mates)
     foresee(team, me)
+    place_mates(team, me, mates)
     if team.settings.centralized:
         settle_lead(team, me, mates)
     if me.known == 0:
@@ -223,6 +213,7 @@ def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, a
     wanted = complex(float(action[0]), float(action[1]))
     wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
     foresee(team, me)
+    place_mates(team, me, mates)
     want(me, wanted, 0.0)
     execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
 

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
+from posse.declarations import FIELDS
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import beam_directions
 from posse.scenarios.setting import OPEN_PLANE_EXTENT
@@ -34,15 +35,7 @@ GRID: Final = 16
 
 # --- what a team has in common -------------------------------------------------------------------
 
-_FIELDS: Final = (
-    *("heading", "position", "speed", "turn_rate", "number"),
-    *("max_speed", "max_turn_rate", "acceleration_time", "turn_acceleration_time"),
-    *("target_known", "target_seen", "target_age", "target_range", "target_bearing"),
-    *("target_heading", "target_frame", "target_velocity", "sonar"),
-    *("arena", "arena_height", "control_step", "robot_radius"),
-    *("neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing"),
-    *("neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message"),
-)
+_FIELDS: Final = (*(field.name for field in FIELDS.built_in()), "sonar", "neighbour_message")
 _RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
@@ -52,19 +45,6 @@ _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 def unit_of(scenario: Scenario) -> float:
     """Return the length (m) that the robots of a scenario take for a metre: 1 at a radius of 0.15 m."""
     return scenario.robot_radius / _RADIUS
-
-
-def in_units(layout: ObservationLayout, observations: FloatArray) -> FloatArray:
-    """Return observations (E, R, F) whose lengths and speeds are in units of :func:`unit_of`."""
-    unit = unit_of(layout.scenario)
-    if unit == 1.0:
-        return observations
-    converted = observations.copy()
-    views = layout.views(converted)
-    for field in layout.fields:
-        if field.unit in ("m", "m/s"):
-            views[field.name] /= unit
-    return converted
 
 
 def _record(**values: Any) -> Records:
@@ -156,20 +136,6 @@ class Team(NamedTuple):
     """(S,) direction of each sonar beam in the robot's own axes."""
 
 
-def team_of(layout: ObservationLayout, settings: Settings) -> Team:
-    """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
-    scenario = layout.scenario
-    slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
-    cosines, sines = beam_directions(scenario)
-    return Team(
-        offsets_of(layout),
-        constants_of(scenario, settings),
-        settings_of(settings),
-        np.array(slots, np.complex64),
-        (cosines + 1j * sines).astype(np.complex64),
-    )
-
-
 # --- memory --------------------------------------------------------------------------------------
 
 
@@ -200,6 +166,8 @@ MIND: Final = _record(
     known=_I(0),  # 1: there is an estimate that is not too old
     horizon=_F(0),  # distance within which every team-mate that is heard is listed, m
     usual_gap=_F(0),  # about the longest silence of a team-mate lately, s
+    patience=np.float64(0),  # silence up to which a team-mate counts as working and in range, s
+    others=_I(0),  # how many do
     usual_age=_F(0),  # about the usual age of the fix, s
     # tracking
     task=_I(0),
@@ -239,6 +207,9 @@ MATE: Final = _record(
     velocity=_C(0),
     heading=_C(0),
     turn=_F(0),  # turn rate, rad/s
+    # when the command of this step is executed
+    there=_I(0),  # 1: counts as working and in range
+    place=np.complex128(0),
     # from its drifting frame to the own one, measured by the target that both see
     aligned=_I(0),  # 1: has been measured
     shift=_C(0),  # m
@@ -269,7 +240,19 @@ class Minds(OwnArrays):
     """
 
     def __init__(self, layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> None:
-        self.layout, self.team = layout, team_of(layout, settings)
+        self.layout, unit = layout, unit_of(layout.scenario)
+        cosines, sines = beam_directions(layout.scenario)
+        self.team = Team(
+            offsets_of(layout),
+            constants_of(layout.scenario, settings),
+            settings_of(settings),
+            np.array([complex(*slot) / unit for slot in layout.scenario.slot_offsets], np.complex64),
+            (cosines + 1j * sines).astype(np.complex64),
+        )
+        self._units = np.ones(layout.size, np.float32)
+        for field in layout.fields:
+            if field.unit in ("m", "m/s"):
+                layout.views(self._units)[field.name][...] = unit
         self.me: Records = np.full((num_worlds, robots), MIND)
         self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE)
 
@@ -279,7 +262,8 @@ class Minds(OwnArrays):
 
     def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
         """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
-        work, rows = work_for(self.mates.shape[2]), in_units(self.layout, observations)
+        work = work_for(self.mates.shape[2])
+        rows = observations if unit_of(self.layout.scenario) == 1.0 else observations / self._units
         over_worlds(kernel, ((self.team, self.me, self.mates), work, rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:

@@ -219,34 +219,19 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
 
 
 @compiled
-def patience(team: Team, me: Record) -> float:
-    """Return the timeout (s) of a silence: over twice the usual."""
-    settings = team.settings
-    return float(min(settings.lost_after, settings.least_patience + 2.0 * me.usual_gap))
+def place_mates(team: Team, me: Record, mates: Records) -> None:
+    """Determine which team-mates count as working and in range, and where each is when the command is executed.
 
-
-@compiled
-def is_there(team: Team, me: Record, mate: Record) -> bool:
-    """Return whether a tracker is another one (nothing is heard of oneself) that counts as working and in range."""
-    if mate.step < 0:
-        return False
-    return since(team, me, mate.step) <= (_UNSEEN_MEMORY if team.world.unlisted else patience(team, me))
-
-
-@compiled
-def others_there(team: Team, me: Record, mates: Records) -> int:
-    """Return how many other trackers count as working and in range."""
-    others = 0
+    One that has been silent for over twice the usual time counts as stopped. Of oneself nothing is heard.
+    """
+    settings, me.others = team.settings, 0
+    me.patience = min(settings.lost_after, settings.least_patience + 2.0 * me.usual_gap)
     for j in range(len(mates)):
-        if is_there(team, me, mates[j]):
-            others += 1
-    return others
-
-
-@compiled
-def mate_now(team: Team, me: Record, mate: Record) -> tuple[complex, complex]:
-    """Return the predicted position of a team-mate and its velocity; after a long silence it counts as stopped."""
-    age = since(team, me, mate.step)
-    if age > patience(team, me):
-        return mate.position, 0j
-    return mate.position + scaled(mate.velocity, age + team.world.lead), mate.velocity
+        mate = mates[j]
+        silence = since(team, me, mate.step)
+        mate.place = mate.position
+        if silence <= me.patience:
+            mate.place = mate.position + scaled(mate.velocity, silence + team.world.lead)
+        mate.there = mate.step >= 0 and silence <= (_UNSEEN_MEMORY if team.world.unlisted else me.patience)
+        me.others += mate.there
+    mates[me.number].place = me.position

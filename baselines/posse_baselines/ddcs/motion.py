@@ -20,7 +20,6 @@ import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import GRID, Team, is_due, since
-from posse_baselines.ddcs.monitoring import is_there, mate_now, others_there, patience
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
@@ -47,7 +46,7 @@ def follows(team: Team, me: Record, mates: Records) -> bool:
         return False
     leader = mates[me.leader]
     # A silent leader that cannot be replaced is followed at its last known position.
-    return is_there(team, me, leader) or (settings.forbidden[FLOCKING, EXCHANGING] != 0 and leader.step >= 0)
+    return bool(leader.there) or (settings.forbidden[FLOCKING, EXCHANGING] != 0 and leader.step >= 0)
 
 
 @compiled
@@ -205,15 +204,14 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
     """
     theta, age = angle_of(mate.heading), since(team, me, mate.step)
     speed, rate = 0.0, 0.0
-    if age <= patience(team, me):
+    if age <= me.patience:
         speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
         theta = wrap(theta + rate * (age + team.world.lead))
     frame = theta
     if team.settings.by_slot_frame:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
-    position, _ = mate_now(team, me, mate)
-    place = position + (team.slots[me.slot] - team.slots[slot]) * vector(1.0, frame)
-    return Reference(position, speed, theta, place, frame, rate)
+    place = mate.place + (team.slots[me.slot] - team.slots[slot]) * vector(1.0, frame)
+    return Reference(mate.place, speed, theta, place, frame, rate)
 
 
 @compiled
@@ -254,7 +252,7 @@ def second_of(team: Team, me: Record, mates: Records) -> int:
         mate = mates[j]
         if j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
             continue
-        if (found >= 0 and mate.slot < mates[found].slot) or not is_there(team, me, mate):
+        if (found >= 0 and mate.slot < mates[found].slot) or not mate.there:
             continue
         to_mate = place - team.slots[mate.slot]
         if abs(cross(to_leader, to_mate)) >= 2.0 * _LEAST_CROSSING * (length(to_leader) * length(to_mate)):
@@ -372,7 +370,7 @@ def choose_goal(team: Team, me: Record, mates: Records) -> None:
     inner_x = world.area_x - min(_OFF_WALL, 0.5 * world.area_x)
     inner_y = world.area_y - min(_OFF_WALL, 0.5 * world.area_y)
     lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
-    deaf = 1.0 - others_there(team, me, mates) / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
+    deaf = 1.0 - me.others / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
     best, me.goal, me.goal_step = -1e9, 0j, me.step
     for i in range(GRID):
         for j in range(GRID):
@@ -398,10 +396,9 @@ def choose_goal(team: Team, me: Record, mates: Records) -> None:
             if value <= best:
                 continue  # team-mates can only reduce it
             for m in range(len(mates)):
-                if is_there(team, me, mates[m]):
+                if mates[m].there:
                     # A team-mate's goal counts more than its position.
-                    position, _ = mate_now(team, me, mates[m])
-                    other = length(place - position - scaled(mates[m].velocity, 2.0))
+                    other = length(place - mates[m].place - scaled(mates[m].velocity, 2.0))
                     if other < way:
                         value -= way - other
             if value > best:

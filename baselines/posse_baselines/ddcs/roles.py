@@ -26,7 +26,7 @@ import numpy as np
 
 from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import Team, is_due, since
-from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, others_there, patience
+from posse_baselines.ddcs.monitoring import COUNT, is_newer
 from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
 from posse_baselines.laws.steering import Course, Work, assign, time_to_slot
@@ -58,18 +58,12 @@ def appoint(me: Record, leader: int, term: int, pulse: int) -> None:
 
 
 @compiled
-def position_of(team: Team, me: Record, mates: Records, j: int) -> complex:
-    """Return the current position of tracker j, which may be this one."""
-    return me.position if j == me.number else mate_now(team, me, mates[j])[0]
-
-
-@compiled
 def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]:
     """Return the working tracker nearest to the target, this one or one that does not lead, and its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
-        if j != me.leader and is_there(team, me, mates[j]):
-            distance = length(me.target - mate_now(team, me, mates[j])[0])
+        if j != me.leader and mates[j].there:
+            distance = length(me.target - mates[j].place)
             if distance < least:
                 best, least = j, distance
     return best, least
@@ -80,11 +74,11 @@ def central_tracker(team: Team, me: Record, mates: Records) -> int:
     """Return the tracker with the least sum of distances to all heard."""
     best, least = int(me.number), 1e30
     for i in range(len(mates)):
-        if i == me.number or is_there(team, me, mates[i]):
-            position, total = position_of(team, me, mates, i), 0.0
+        if i == me.number or mates[i].there:
+            total = 0.0
             for j in range(len(mates)):
-                if j == me.number or is_there(team, me, mates[j]):
-                    total += length(position - position_of(team, me, mates, j))
+                if j == me.number or mates[j].there:
+                    total += length(mates[i].place - mates[j].place)
             # Ties within rounding go to the lower number.
             if total < least - 1e-3:
                 best, least = i, total
@@ -97,7 +91,7 @@ def select_leader(team: Team, me: Record, mates: Records) -> None:
     best, term = int(me.number), me.term + 1
     if me.known:
         best, _ = nearest_tracker(team, me, mates)
-    elif others_there(team, me, mates) == 0:
+    elif me.others == 0:
         term = me.term - 1
     else:
         central = central_tracker(team, me, mates)
@@ -131,7 +125,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
             best, least = nearest_tracker(team, me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
-    elif since(team, me, me.pulse_step) > patience(team, me) + settings.lead_patience:
+    elif since(team, me, me.pulse_step) > me.patience + settings.lead_patience:
         select_leader(team, me, mates)
 
 
@@ -166,7 +160,7 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     cost[:] = 0.0  # of one that is not there: it takes what is left over
     for j in range(n):
         mate = mates[j]
-        there = j == me.number or is_there(team, me, mate)
+        there = j == me.number or mate.there != 0
         if not there and (team.world.unlisted == 0 or mate.slot < 0):
             continue
         if not there:
@@ -177,12 +171,11 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
                 mate.slot = -1
                 continue
         held, heading = (me.slot, me.heading) if j == me.number else (mate.slot, mate.heading)
-        position = position_of(team, me, mates, j)
         for k in range(n):
             if not there:
                 cost[j, k] = 0.0 if k == held else _RESERVED
                 continue
-            time = slot_cost(team, me, position, heading, k)
+            time = slot_cost(team, me, mate.place, heading, k)
             if held == k:
                 time -= settings.loyalty
             if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
@@ -209,8 +202,8 @@ def has_precedence(team: Team, me: Record, mates: Records) -> bool:
     place = me.target + team.slots[me.slot] * me.frame
     mine = length(place - me.position)
     for j in range(len(mates)):
-        if mates[j].slot == me.slot and is_there(team, me, mates[j]):
-            other = length(place - mate_now(team, me, mates[j])[0])
+        if mates[j].slot == me.slot and mates[j].there:
+            other = length(place - mates[j].place)
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
                 return True
     return False

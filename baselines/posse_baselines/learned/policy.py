@@ -48,6 +48,16 @@ class _Memory(NamedTuple):
     minds: Any
     """Of the adviser, or the :class:`~posse_baselines.safeguard.Guard`; ``None``: of neither."""
 
+    def restart(self, mask: BoolArray) -> None:
+        """Restart encoder, adviser and safeguard in the worlds of a mask (E,)."""
+        self.encoder.restart(mask)
+        if self.minds is not None:
+            self.minds.restart(mask)
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return what encoder, adviser and safeguard remember as arrays by name; views, not copies."""
+        return {**self.encoder.arrays(), **({} if self.minds is None else self.minds.arrays())}
+
 
 class LearnedPolicy(OwnArrays, BasePolicy):
     """A learned policy, played from plain numbers.
@@ -141,17 +151,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     def _forward(self, inputs: FloatArray) -> FloatArray:
         """Return the outputs of the network (E N, 2 + m) for its inputs."""
         return forward(self._flat, inputs)
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with encoder, adviser and safeguard restarted in the worlds of a mask (E,)."""
-        memory.encoder.restart(mask)
-        if memory.minds is not None:
-            memory.minds.restart(mask)
-        return memory
-
-    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory of encoder, adviser and safeguard as arrays by name; views, not copies."""
-        return {**memory.encoder.arrays(), **({} if memory.minds is None else memory.minds.arrays())}
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""

@@ -352,9 +352,6 @@ class BeliefPlanner(DDCS):
 
     def _working(self, minds: Minds) -> BoolArray:
         """Return which trackers each one takes to work and to be in range, (R, N)."""
-        settings, me = minds.team.settings[0], minds.me
-        patience = np.minimum(settings["lost_after"], settings["least_patience"] + 2.0 * me["usual_gap"])
-        silence = (me["step"][..., None] - minds.mates["step"]) * me["dt"][..., None]
-        there = (minds.mates["step"] >= 0) & (silence <= patience[..., None])
-        there |= np.arange(there.shape[-1]) == me["number"][..., None]
-        return np.asarray(there.reshape(-1, there.shape[-1]))
+        mates = minds.mates["there"] != 0
+        mates |= np.arange(mates.shape[-1]) == minds.me["number"][..., None]
+        return np.asarray(mates.reshape(-1, mates.shape[-1]))

@@ -227,11 +227,6 @@ class Planner(BasePolicy):
         """Return actions for the state that the watched batch is in; observations are not read."""
         return memory.actions()[:, : memory.batch.scenario.num_trackers], memory
 
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Forget the plans of the worlds of a mask (E,)."""
-        memory.restart(mask)
-        return memory
-
     def annotations(self, memory: Memory) -> dict[str, Any]:
         """Return ``slot`` (E, N), the slot that each tracker is sent to; -1: none."""
         return {"slot": memory.teams.plans["slot"].copy()}
