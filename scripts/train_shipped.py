@@ -19,7 +19,7 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-CORRECTIONS: Final = ("smart", "robots")
+CORRECTIONS: Final = ("smart", "field", "robots")
 """Scenarios with a team that corrects the script, ``corrected-SCENARIO``."""
 LEAGUE: Final = LeagueSettings(
     scenario="duel", generations=4, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
