@@ -193,27 +193,6 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
 # --- the named scenarios --------------------------------------------------------------------------
 
 
-# A version rises when the behaviour of a named scenario changes, and only then.
-VERSIONS = {
-    "constant": 1,
-    "accelerating": 2,
-    "smart": 1,
-    "search": 3,
-    "obstacles": 2,
-    "radio": 2,
-    "leader-loss": 2,
-    "field": 3,
-    "duel": 3,
-    "robots": 1,
-    "paper-centralized": 1,
-    "paper-distributed": 1,
-}
-
-
-def test_the_names_and_versions_are_the_published_ones() -> None:
-    assert {name: get_scenario(name).version for name in scenario_names()} == VERSIONS
-
-
 @functools.cache
 def started(name: str) -> posse.Batch:
     batch = posse.batch(name, 200, seed=5)
@@ -304,11 +283,3 @@ def test_every_slot_can_be_followed_without_reversing(formation: str, motion: st
             assert (np.abs(carried) <= min(s.tracker_speeds)).all()
             assert (carried.real >= -1e-5).all()
     assert turned == pytest.approx(most, rel=1e-3), "the limit was reached"
-
-
-def test_the_slot_turn_rate_is_the_one_designed() -> None:
-    s = posse.get_scenario("constant", tracker_speed=1.0, target_speed=0.6)
-    farthest = abs(complex(-1.2 - 2 * 1.2 * math.sqrt(0.5), 2 * 1.2 * math.sqrt(0.5)))
-    assert s.slot_turn_rate == pytest.approx(0.8 * 0.4 / farthest)
-    slow = s.replace(target_speed=0.1)
-    assert slow.slot_turn_rate == pytest.approx(0.1 / farthest)
