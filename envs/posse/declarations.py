@@ -171,44 +171,39 @@ class Registry(dict[str, D]):
         self.make = make
         self.kind = make.kind
 
-    def decorator(self, **options: Any) -> Callable[[Function], Function]:
-        """Return the decorator that declares a function; raise if the function is its first argument."""
+    def decorator(self, **options: Any) -> Decorator:
+        """Return the decorator that declares a function, and returns it, compiled if kernels call it.
+
+        A declaration replaces one that was made on a function of the same module and qualified name.
+
+        Args:
+            **options: Attributes of the declaration; its name is by default that of the function.
+
+        Raises:
+            DeclarationError: The function is the first argument, or, when one is declared, the declaration is invalid
+                or its name taken.
+        """
         first = next(iter(options.values()))
         if callable(first):
             reason = 'the decorator needs arguments: a unit, such as "1", or a name'
             raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
-        return lambda function: self.declare(function, **options)
 
-    def declare(self, function: Function, **options: Any) -> Function:
-        """Add the declaration made on a function, and return the function, compiled if kernels call it.
+        def declare(function: Function) -> Function:
+            made = self.make(function=function, **{"name": getattr(plain(function), "__name__", ""), **options})
+            taken = self.get(made.name)
+            if taken is not None and _home(taken.function) != _home(function):
+                raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
+            self[made.name] = made
+            return made.function
 
-        It replaces one that was made on a function of the same module and qualified name.
-
-        Args:
-            function: The function.
-            **options: Further attributes of the declaration; its name is by default that of the function.
-
-        Raises:
-            DeclarationError: The declaration is invalid, or its name is taken.
-        """
-        options.setdefault("name", getattr(plain(function), "__name__", ""))
-        made = self.make(function=function, **options)
-        taken = self.get(made.name)
-        if taken is not None and _home(taken.function) != _home(function):
-            raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
-        self[made.name] = made
-        return made.function
+        return declare
 
     def built_in(self) -> tuple[D, ...]:
         """Return the built-in declarations, in order."""
         return tuple(each for each in self.values() if each.built_in)
 
     def with_added(self, *names: str) -> tuple[D, ...]:
-        """Return the built-in declarations, then the named ones, each once.
-
-        Raises:
-            KeyError: An unknown name; the message suggests similar ones.
-        """
+        """Return the built-in declarations, then the named ones, each once; KeyError for an unknown name."""
         added = (self[name] for name in dict.fromkeys(names))
         return (*self.built_in(), *(each for each in added if not each.built_in))
 

@@ -29,7 +29,8 @@ from posse.engine.kernels import (
     fixed_for,
     kernel_of,
 )
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
+from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError

@@ -17,20 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import RewardTerm
-from posse.numeric import (
-    ONE,
-    UNCOMPILED,
-    WIDTH,
-    ZERO,
-    BoolArray,
-    FloatArray,
-    Record,
-    Records,
-    compiled,
-    fetch,
-    kernel,
-    stamp,
-)
+from posse.numeric import ONE, UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
+from posse.numeric.compile import stamp
+from posse.numeric.lanes import fetch
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out
 from posse.rules.faults import apply_faults, draw_coming_faults

@@ -5,28 +5,9 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records, record_type
-from posse.numeric.compile import UNCOMPILED, compiled, kernel, out_of_line, stamp
-from posse.numeric.lanes import (
-    WIDTH,
-    Lanes,
-    Mask,
-    bits,
-    choose,
-    counts,
-    eight,
-    fetch,
-    greater,
-    least,
-    lesser,
-    load,
-    load_fields,
-    lowest_bit,
-    root,
-    store,
-    store_fields,
-    transpose,
-)
-from posse.numeric.threads import MOST_THREADS, over_worlds, threads_for
+from posse.numeric.compile import UNCOMPILED, compiled, kernel, out_of_line
+from posse.numeric.lanes import WIDTH, Lanes, Mask, choose, eight, greater, lesser, root
+from posse.numeric.threads import MOST_THREADS, over_worlds
 
 __all__ = [
     "HALF",
@@ -43,26 +24,14 @@ __all__ = [
     "OwnArrays",
     "Record",
     "Records",
-    "bits",
     "choose",
     "compiled",
-    "counts",
     "eight",
-    "fetch",
     "greater",
     "kernel",
-    "least",
     "lesser",
-    "load",
-    "load_fields",
-    "lowest_bit",
     "out_of_line",
     "over_worlds",
     "record_type",
     "root",
-    "stamp",
-    "store",
-    "store_fields",
-    "threads_for",
-    "transpose",
 ]

@@ -289,12 +289,7 @@ def load_fields(record: Record, offset: int) -> Lanes:
 
 @_accesses(_write, types.Record, types.none, _LANES)
 def store_fields(record: Record, offset: int, value: Lanes) -> None:
-    """Write eight float32 from ``offset`` bytes into a record on.
-
-    Lanes over fields of other types must hold what :func:`load_fields` returned.
-    """
-    for name, (kind, at, *_) in record.dtype.fields.items():
-        if kind.names is not None:  # a record within it
-            store_fields(record[name], offset - at, value)
-        elif kind == np.float32 and offset <= at < offset + 4 * WIDTH:
+    """Write eight fields, float32, from ``offset`` bytes into a record on."""
+    for name, (_, at, *_) in record.dtype.fields.items():
+        if offset <= at < offset + 4 * WIDTH:
             record[name] = value[(at - offset) // 4]

@@ -11,23 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    ONE,
-    WIDTH,
-    ZERO,
-    Lanes,
-    Record,
-    Records,
-    bits,
-    choose,
-    compiled,
-    greater,
-    least,
-    lesser,
-    load,
-    out_of_line,
-    root,
-)
+from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, compiled, greater, lesser, out_of_line, root
+from posse.numeric.lanes import bits, least, load
 from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
 from posse.rules.state import BIT, NO_BITS
 

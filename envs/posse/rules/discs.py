@@ -11,24 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    ONE,
-    WIDTH,
-    FloatArray,
-    Lanes,
-    Record,
-    Records,
-    choose,
-    compiled,
-    eight,
-    greater,
-    lesser,
-    load,
-    load_fields,
-    root,
-    store,
-    transpose,
-)
+from posse.numeric import ONE, WIDTH, FloatArray, Lanes, Record, Records, choose, compiled, eight, greater, lesser, root
+from posse.numeric.lanes import load, load_fields, store, transpose
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NO_BITS, POSE, Pose
 

@@ -11,24 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from posse.numeric import (
-    HALF,
-    ONE,
-    WIDTH,
-    ZERO,
-    FloatArray,
-    Lanes,
-    Record,
-    Records,
-    compiled,
-    eight,
-    greater,
-    lesser,
-    load,
-    out_of_line,
-    store,
-    store_fields,
-)
+from posse.numeric import HALF, ONE, WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, out_of_line
+from posse.numeric.lanes import eight, greater, lesser, load, store, store_fields
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import FAR, blocks, columns, write_block
 from posse.rules.kinematics import approach, arc, follow_heading
@@ -132,16 +116,7 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
             )
             dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
             x, y = x + dx, y + dy
-        moved = Pose(
-            x=x,
-            y=y,
-            heading_cos=cosine,
-            heading_sin=sine,
-            speed=speed,
-            turn_rate=turn_rate,
-            max_speed=pose.max_speed,
-            max_turn_rate=pose.max_turn_rate,
-        )
+        moved = x, y, cosine, sine, speed, turn_rate, pose.max_speed, pose.max_turn_rate
         write_block(moved, 0, s.new_pose[i:])
     others = False
     for i in range(n):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any, Final
 
 from posse.declarations import unknown
@@ -150,11 +149,6 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(SCENARIOS)
 
 
-@functools.cache
-def _named(name: str) -> Scenario:
-    return Scenario(name=name, **SCENARIOS[name])
-
-
 def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
 
@@ -172,7 +166,7 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     if isinstance(scenario, Scenario):
         found = scenario
     elif scenario in tuple(SCENARIOS):  # also of what is not hashable
-        found = _named(scenario)
+        found = Scenario(name=scenario, **SCENARIOS[scenario])
     else:
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
     if "horizon" in overrides and "settle_time" not in overrides:

@@ -14,28 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import (
-    ONE,
-    TINY,
-    ZERO,
-    FloatArray,
-    Lanes,
-    Mask,
-    Record,
-    bits,
-    choose,
-    compiled,
-    counts,
-    eight,
-    greater,
-    lesser,
-    load,
-    load_fields,
-    out_of_line,
-    root,
-    store,
-    transpose,
-)
+from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled, out_of_line
+from posse.numeric.lanes import bits, choose, counts, eight, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (

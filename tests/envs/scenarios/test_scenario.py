@@ -23,18 +23,14 @@ FIELDS = [field.name for field in dataclasses.fields(Scenario)]
 # What is refused, and words that the message must have beside the field's name.
 IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"num_trackers": 2.0}, "whole"),
-    ({"num_trackers": True}, "whole"),
     ({"tracker_speed": math.nan}, "number"),
-    ({"tracker_speed": 10**400}, "number"),
     ({"tracker_speed": (1.0, 2.0)}, "2 values for num_trackers=5: give one number, or one for each"),
     ({"tracker_speed": (1.0,) * 4 + (0.0,)}, "tracker_speed[4]=0.0"),
-    ({"tracker_speed": (1.0,) * 4 + (0.5,)}, "must be below tracker_speed=0.5"),
     ({"tracker_speed": 1000.0, "horizon": 4, "settle_time": 0.1}, "physics_step <= 0.0173"),
     ({"tracker_turn_rate": 30.0}, "physics_step"),
     ({"target_motion": "smrat"}, "did you mean 'smart'"),
     ({"target_speed": 1.0}, "0.01 %"),
     ({"target_speed": 1e-300, "target_motion": "smart"}, "constant"),
-    ({"target_turn_rate": 21.0}, "physics_step"),
     ({"wheel_base": 3.0}, "lower it, or tracker_turn_rate"),
     ({"target_least_speed": 0.7}, "at most target_speed=0.6"),
     ({"formation_distance": 0.3}, "target"),
@@ -44,10 +40,8 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"control_step": 0.12}, "physics_step"),
     ({"horizon": 10**6, "tracker_speed": 9.0}, "at most 500 m"),
     ({"arena": 2.0}, "too small"),
-    ({"arena": (20.0, 2.0)}, "too small"),
     ({"arena": (20.0, math.inf)}, "both be finite"),
     ({"arena": (20.0, 10.0, 5.0)}, "(width, height)"),
-    ({"arena": (20.0, 1001.0)}, "arena[1]=1001.0"),
     ({"num_obstacles": 3}, "arena"),
     ({"obstacle_radius": (0.8, 0.4)}, "least"),
     ({"start_distance": (0.2, 3.0)}, "clear of the target"),
@@ -56,10 +50,8 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"break_number": 5, "break_choice": "given", "breaks": 1}, "0 to 4"),
     ({"extra_fields": 5}, "tuple of names"),
     ({"extra_fields": ("speed",)}, "in every observation"),
-    ({"metrics": ["scor"]}, "did you mean 'score'"),
     ({"metrics": ("score", "score")}, "each once"),
     ({"reward_weights": {"slots": 1.0}}, "did you mean 'slot'"),
-    ({"reward_weights": {"slot": math.nan}}, "number"),
     ({"reward_weights": 3}, "reward terms"),
     ({"target_reward_weights": {"slot": 1.0}}, "term of a target 'slot'"),
 ]
@@ -234,12 +226,6 @@ def test_in_leader_loss_the_leader_alone_sees_the_target_from_its_slot() -> None
     # At the start everyone does, so that nothing but the loss is tested.
     assert s.start_distance[1] < s.sensing_range
     assert started("leader-loss").state["tracker_sees"].all()
-
-
-def test_the_target_of_robots_is_a_robot_of_the_same_kind() -> None:
-    s = get_scenario("robots")
-    wheel = s.target_speed + s.target_turn_rate * s.wheel_base / 2
-    assert 0.98 * s.tracker_speeds[0] < wheel <= s.tracker_speeds[0], "as fast as its wheels can"
 
 
 @pytest.mark.parametrize("formation", FORMATIONS)

@@ -135,14 +135,6 @@ def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None:
-    policies = ("a/b=idle", "a?b=idle", "A/B=pursuit")
-    found = compare(Settings(policies, ("constant",), 1, out=tmp_path, **ALONE))
-    files = [name for row in found.rows for name in row["files"]]
-    assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
-    assert all((tmp_path / name).is_file() for name in files)
-
-
 # --- against a given target -----------------------------------------------------------------------
 
 

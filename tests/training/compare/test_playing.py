@@ -1,14 +1,10 @@
 """The failure of a policy is reported, and affects only its own rows."""
 
 import json
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.support.process import ROOT, printed
 
 from posse_training import evaluate
 from posse_training.cli import main
@@ -52,19 +48,6 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     assert (there == here).all()
 
 
-UNGUARDED = """
-from posse_training.cli import main
-policies = ["posse_baselines.policies.simple:Pursuit", "--planner-episodes", "0", "--no-figures"]
-raise SystemExit(main(["compare", *policies, "--scenario", "constant", "--episodes", "2", "--out", "out"]))
-"""
-
-
-def test_a_script_without_a_main_guard_may_compare(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(UNGUARDED)
-    printed("script.py", cwd=tmp_path)
-    assert (tmp_path / "out").is_dir()
-
-
 def alive(pid: int) -> bool:
     stat = Path(f"/proc/{pid}/stat")
     return stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z"
@@ -77,24 +60,6 @@ def test_a_policy_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monkey
     assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
     assert ["exceeded the time limit of 10 s" in row["why"] for row in found.failed] == [True]
     assert not alive(int((tmp_path / "pid").read_text()))
-
-
-@pytest.mark.long
-def test_a_hanging_policy_does_not_outlive_a_killed_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pid = tmp_path / "pid"
-    monkeypatch.setenv("PID_FILE", str(pid))
-    code = "from posse_training.cli import main; main()"
-    words = ["compare", f"{BAD}Hangs", *OPTIONS, "--time-limit", "12", "--out", str(tmp_path / "out")]
-    running = subprocess.Popen([sys.executable, "-c", code, *words], cwd=ROOT)
-    while not pid.exists() or not pid.read_text():
-        assert running.poll() is None
-        time.sleep(0.01)
-    running.kill()
-    running.wait()
-    ends = time.monotonic() + 60
-    while alive(int(pid.read_text())):
-        assert time.monotonic() < ends
-        time.sleep(0.1)
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,11 +35,6 @@ def test_a_split_that_a_policy_was_trained_on_is_refused() -> None:
         evaluate(Trained(), "constant", 1, split="validation", **FAST)  # type: ignore[arg-type]
 
 
-def test_an_unknown_metric_is_named() -> None:
-    with pytest.raises(KeyError, match="unknown metric 'scor'"):
-        evaluate("idle", "constant", 1, **FAST)["scor"]
-
-
 def test_rows_and_settings_are_written_as_files(tmp_path: Path) -> None:
     results = evaluate("idle", "radio", 3, seed=9, **FAST)
     results.write(tmp_path / "deep" / "idle.csv")

@@ -12,7 +12,6 @@ from tests.support.replays import short
 
 import posse
 from posse_baselines import Recorder, Trajectory, begin, load
-from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.replay import RECORD, Player, Replay, record, replay_of
 from posse_training.replay.columns import find_events
@@ -187,9 +186,3 @@ def test_any_column_comes_back_to_half_its_resolution(values: Any, name: str) ->
     np.testing.assert_array_equal(np.isnan(back), np.isnan(values))
     off = np.abs(back - values)
     assert np.nanmax(off, initial=0) <= resolution_of(name, values) * 0.5 * (1 + 1e-9)
-
-
-def test_a_number_that_a_page_cannot_hold_is_refused() -> None:
-    replay = Replay({}, (Player("p", {"belief/a": np.array([0.5, -2e7])}),))
-    with pytest.raises(SettingsError, match=r"'belief/a' is too great for a replay: it holds numbers below 1\.07"):
-        encode(replay)

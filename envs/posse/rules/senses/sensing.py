@@ -8,7 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from posse.declarations import sensor
-from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, bits, compiled, load, root
+from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, compiled, root
+from posse.numeric.lanes import bits, load
 from posse.rules.discs import blocks
 from posse.rules.kinematics import turned
 from posse.rules.randomness import HEADING_NOISE, SENSOR_NOISE, normal_pair

@@ -6,26 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    ONE,
-    TINY,
-    WIDTH,
-    ZERO,
-    FloatArray,
-    Record,
-    Records,
-    bits,
-    choose,
-    compiled,
-    eight,
-    greater,
-    lesser,
-    load,
-    lowest_bit,
-    out_of_line,
-    root,
-    store,
-)
+from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled, out_of_line
+from posse.numeric.lanes import bits, choose, eight, greater, lesser, load, lowest_bit, root, store
 from posse.rules.discs import FAR, blocks, num_discs, to_wall
 from posse.rules.kinematics import in_frame
 

@@ -12,23 +12,8 @@ from typing import Final
 import numpy as np
 
 from posse.declarations import Memory, target_motion
-from posse.numeric import (
-    HALF,
-    ONE,
-    TINY,
-    WIDTH,
-    ZERO,
-    Record,
-    Records,
-    choose,
-    compiled,
-    eight,
-    lesser,
-    load,
-    out_of_line,
-    root,
-    store,
-)
+from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compiled, out_of_line
+from posse.numeric.lanes import choose, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
 from posse.scenarios.setting import SLACK
