@@ -215,9 +215,9 @@ def _soft(v: complex, scale: np.float32) -> complex:
 
 @compiled
 def _gather_team(row: FloatArray, f: Record, patience: np.float32, team: Record) -> None:
-    """Write the present positions of the known team: own robot, then those heard of, in the end those taken for broken.
+    """Write the present positions of the known team, own robot first.
 
-    These have been silent for longer than the ``patience`` (s).
+    Robots silent for longer than the ``patience`` (s) are taken for broken, and come last.
     """
     team.places[0], team.count = 0j, 1
     for silent in (False, True):

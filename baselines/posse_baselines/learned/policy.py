@@ -125,8 +125,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` worlds; PolicyError if the layout lacks a field that is read."""
         super().begin(layout, num_worlds)
-        minds = self.adviser.begin(layout, num_worlds) if self.adviser else None
-        minds = Guard(layout, num_worlds) if self.safeguard else minds
+        minds = Guard(layout, num_worlds) if self.safeguard else None
+        if self.adviser is not None:  # it has a safeguard of its own
+            minds = self.adviser.begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         return _Memory(layout, Encoder(self.encoding, layout, num_worlds, robots), minds)
 

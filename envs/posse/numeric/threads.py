@@ -20,7 +20,7 @@ from posse.numeric.lanes import WIDTH
 MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Number of cores available to the process."""
 _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
-_LEAST_SHARE: Final = 16 * WIDTH  # worlds; ten times what a call takes
+_LEAST_SHARE: Final = 16 * WIDTH  # worlds; to step them takes ten times as long as a call
 
 
 @functools.cache

@@ -99,7 +99,7 @@ def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
 def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Write the positions of all discs: trackers, then the target, then obstacles."""
     n = c.num_trackers
-    # The padding first, so that blocks are read as they were written, without a wait.
+    # Padding first: a load of a block that covers two stores would have to wait for them.
     store(s.x, num_discs(c), eight(FAR))
     store(s.y, num_discs(c), eight(FAR))
     for block in range(blocks(n + 1)):

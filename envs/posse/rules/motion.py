@@ -139,7 +139,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     step; a robot with something near moves in swept physics steps.
     """
     w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
-    # Some time before it is read, in blocks: what was just written in parts, the processor has to wait for.
+    # Well before move_freely loads blocks of it: a load that covers several stores has to wait for them.
     take_commands(c, w, actions, worlds.command[e], s)
     if c.target_agent != 0:
         action = actions[c.num_trackers]

@@ -11,21 +11,21 @@ from posse_baselines.learned import Encoding, LearnedPolicy
 SCRIPT = DDCS.of("ddcs-distributed")
 
 
-def listener(answer: tuple[float, float], kind: str = "features") -> LearnedPolicy:
+def listener(answer: tuple[float, float], kind: str = "features", safeguard: bool = False) -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
     encoding = Encoding.of(worlds().layout, kind)
     size = encoding.size + 2
     network = network_for(size, weights=(np.zeros((2, size), np.float32),), biases=(np.array(answer, np.float32),))
-    return LearnedPolicy(network, encoding, {"name": "mine"}, SCRIPT)
+    return LearnedPolicy(network, encoding, {"name": "mine"}, SCRIPT, safeguard)
 
 
 def worlds(count: int = 6) -> posse.Batch:
     return posse.batch("field", count, message_size=SCRIPT.message_size, horizon=80)
 
 
-@pytest.mark.parametrize("kind", ["plain", "features"])
-def test_an_answer_of_zero_is_the_adviser_itself(kind: str) -> None:
-    mine = play(worlds(), listener((0.0, 0.0), kind), seed=3)
+@pytest.mark.parametrize(("kind", "safeguard"), [("plain", False), ("features", True)])
+def test_an_answer_of_zero_is_the_adviser_itself(kind: str, safeguard: bool) -> None:
+    mine = play(worlds(), listener((0.0, 0.0), kind, safeguard), seed=3)
     ddcs = play(worlds(), SCRIPT, seed=3)
     for name, values in ddcs.items():
         np.testing.assert_array_equal(mine[name], values, err_msg=name)

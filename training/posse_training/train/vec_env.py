@@ -194,7 +194,7 @@ class SlotGroup:
         raw = self.batch.reset(seed=seed)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
         self._begin(np.ones(worlds, np.bool_))
-        self._seen[...] = raw
+        self._seen = raw
         self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
         return self.encode(raw)
 
@@ -223,7 +223,7 @@ class SlotGroup:
             self._report(raw, ended, terminated, over, infos)
             raw = batch.reset(options={"reset_mask": ended})
             self._begin(ended)
-        self._seen[...] = raw
+        self._seen = raw
         terms = {name: told[f"reward/{name}"] for name in batch.term_names}
         return self.encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
 
