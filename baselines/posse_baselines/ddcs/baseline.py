@@ -7,7 +7,8 @@ itself does. What ``pngl-l-phi`` does, with equation numbers of the paper:
 ===============================  ======================================================  =======================
 who, when                        law                                                     where
 ===============================  ======================================================  =======================
-everyone, target unknown         explores what the team has not covered yet              ``motion.wander``
+everyone, target unknown         drives ahead, away from team-mates and borders          ``motion.explore``,
+                                                                                         ``laws.exploration``
 leader, far (converging)         PNGL, θ = K σ + c, at full speed: (5), (6), (12)        ``motion.pursue``,
                                                                                          ``laws.guidance``
 leader, near (flocking)          PNGL, the speed of (13) with a correction of the range  ``motion.pursue``
@@ -35,9 +36,9 @@ from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
 from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, read_body, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, place_mates, update_mates, watch_target, write_message
-from posse_baselines.ddcs.motion import begin_search, look_around, move, next_task, want
+from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
-from posse_baselines.ddcs.settings import NO_EXCHANGE, SEARCHING, Settings
+from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
@@ -178,15 +179,12 @@ def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
 def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, proposal: FloatArray) -> None:
     """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
     monitor(team, me, mates, row)
-    look_around(team, me, mates)
     foresee(team, me)
     place_mates(team, me, mates)
     if team.settings.centralized:
         settle_lead(team, me, mates)
     if me.known == 0:
         me.slot = -1
-        if me.task != SEARCHING:
-            begin_search(team, me)
     elif me.slot < 0 or is_due(team, me, team.settings.replan_time):
         choose_slot(team, me, mates, work)
     me.task = next_task(team, me, mates)

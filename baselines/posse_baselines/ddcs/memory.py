@@ -29,8 +29,6 @@ from posse_baselines.laws.steering import Work, work_for
 Kernel = Callable[..., None]
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
-GRID: Final = 16
-"""Cells of a tracker's map of covered areas, along each axis."""
 
 
 # --- what a team has in common -------------------------------------------------------------------
@@ -40,6 +38,7 @@ _RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
+_SEEN_BEFORE: Final = 1.6  # times the range of sight, before a border at which robots that explore are pushed back
 
 
 def unit_of(scenario: Scenario) -> float:
@@ -73,6 +72,7 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
     foreseen = settings.foresight > 0.0 and scenario.command_delay <= _MOST_WAITING
     delay = scenario.command_delay if foreseen else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
+    sight = min(scenario.sensing_range / unit, _MOST_SIGHT)
     return _record(
         dt=dt,  # control step, s
         delay=_I(delay),  # control steps after which a command is executed
@@ -86,17 +86,22 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         walled=_I(scenario.walled),
         half_width=_F(half_width),  # of the arena, m
         half_height=_F(half_height),
-        sight=_F(min(scenario.sensing_range / unit, _MOST_SIGHT)),  # how far its target sensor reaches, m
-        searches=_I(math.isfinite(scenario.sensing_range)),  # 1: it may have to be searched for
+        sight=_F(sight),  # how far its target sensor reaches, m
         # 1: more team-mates than places in an observation
         unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
-        area_x=_F(min(half_width, _OPEN_AREA)),  # half the width of the rectangle that is to be searched, m
-        area_y=_F(min(half_height, _OPEN_AREA)),  # half its height
+        inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m
+        inner_y=_F(_inner(half_height, sight)),  # half its height
         # rad/s, to either side, of a target that is an agent and may turn at any time
         target_turns=scenario.target_turn_rate if scenario.target_is_agent else 0.0,
         outermost=max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m
     )
+
+
+def _inner(half: float, sight: float) -> float:
+    """Return how far from the middle (m) a border begins to push; from there it comes into sight soon."""
+    half = min(half, _OPEN_AREA)
+    return max(0.5 * half, half - _SEEN_BEFORE * sight)
 
 
 def settings_of(settings: Settings) -> Records:
@@ -168,7 +173,6 @@ MIND: Final = _record(
     usual_gap=_F(0),  # about the longest silence of a team-mate lately, s
     patience=np.float64(0),  # silence up to which a team-mate counts as working and in range, s
     others=_I(0),  # how many do
-    usual_age=_F(0),  # about the usual age of the fix, s
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none
@@ -191,12 +195,6 @@ MIND: Final = _record(
     pulse_step=_I(0),  # own step at which the count last went up
     confirmed=_I(0),  # 0: the leader has not been heard of since it was appointed
     exchanges=_I(0),  # times that the lead passed to another, as far as this one knows
-    # searching
-    goal=_C(0),
-    goal_step=_I(-1),  # own step at which the goal was chosen; -1: there is none
-    lost_step=_I(-1),  # when the target was lost; -1: never seen yet
-    area=_C(0),  # middle of the area that is searched
-    seen=np.zeros(GRID * GRID, np.uint16),  # map of it: own step + 1 at which a cell was last covered
 )
 """Memory of one tracker at the start of an episode, an array of one record."""
 

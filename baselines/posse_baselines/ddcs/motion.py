@@ -1,7 +1,7 @@
 """The tracking layer: the four tasks of section 3.1 with their transitions (figure 1), and the law of each.
 
 ===================  =========================================================================
-searching            the target is unknown: explore areas that the team has not covered yet
+searching            the target is unknown: explore, away from team-mates and borders
 converging           chase stage: at full speed to the own place
 flocking             maintenance stage: the formation law, in the own place
 leader exchange      another leader was appointed and has not been heard yet: hold the flock's
@@ -16,22 +16,17 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-import numpy as np
-
-from posse.numeric import Record, Records, compiled, out_of_line
-from posse_baselines.ddcs.memory import GRID, Team, is_due, since
+from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import Team, since
 from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
-from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, unit, vector, wrap
+from posse_baselines.laws.exploration import push_from, push_inwards
+from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
-_FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
-_LOOK_TIME: Final = 0.5  # s; between two updates of the map; least time between two goals
-_OFF_WALL: Final = 1.5  # m; of a goal
-_SWATH: Final = 0.7  # times the range of sight, to either side of a goal
-_LOST_SLOPE: Final = 0.3  # what a cell near a lost target is worth less per metre from its predicted position
+_BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 _LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, below which it is l-φ on the nearer robot
 
 
@@ -91,11 +86,9 @@ def move(team: Team, me: Record, mates: Records) -> None:
     settings = team.settings
     me.closing = 0
     if me.task == SEARCHING or me.slot < 0:
-        want(me, wander(team, me, mates), 0.0)
+        want(me, explore(team, me, mates), 0.0)
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
-    elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
-        hunt(team, me)
     elif follows(team, me, mates):
         if me.task == FLOCKING:
             follow(team, me, mates)
@@ -108,20 +101,6 @@ def move(team: Team, me: Record, mates: Records) -> None:
         pursue(team, me)
     else:
         hold_slot(team, me)
-
-
-@compiled
-def hunt(team: Team, me: Record) -> None:
-    """Set the motion to see a lost target again.
-
-    The team spreads on a ring around its predicted position, slot by slot on either side of its
-    heading; the ring grows with the time that it was not seen.
-    """
-    settings = team.settings
-    side = 1.0 if me.slot % 2 else -1.0
-    angle = me.target_theta + side * ((me.slot + 1) // 2) * 2.0 * math.pi / len(team.slots)
-    way = me.target + vector(settings.hunt_growth * me.fix_age, angle) - me.position
-    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))), 0.0)
 
 
 @compiled
@@ -278,128 +257,23 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     me.wish_speed, me.wish_omega = formation.limit_command(me, speed, omega, offset)
 
 
-# --- searching: exploration that spreads the team over areas not yet covered ----------------------
+# --- searching -----------------------------------------------------------------------------------
 
 
 @compiled
-def mark_seen(team: Team, me: Record, position: complex) -> None:
-    """Mark the cells of the map covered by a tracker as covered now."""
-    world = team.world
-    # In cells from the map's corner; the centre of cell i is at i + 0.5.
-    scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
-    x = (position.real - me.area.real + world.area_x) * scale_x
-    y = (position.imag - me.area.imag + world.area_y) * scale_y
-    reach, narrower = world.sight * scale_x, scale_y / scale_x
-    for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
-        # The cells with centres in range are contiguous in each row.
-        square = reach * reach - (i + 0.5 - x) ** 2
-        if square <= 0.0:
-            continue
-        half = math.sqrt(square) * narrower
-        first = max(0, math.ceil(y - half - 0.5))
-        last = min(GRID - 1, math.floor(y + half - 0.5))
-        for k in range(i * GRID + first, i * GRID + last + 1):
-            me.seen[k] = me.step + 1
+def explore(team: Team, me: Record, mates: Records) -> complex:
+    """Return the velocity (m/s) of a tracker that searches: ahead, away from team-mates and from the borders.
 
-
-@out_of_line
-def begin_search(team: Team, me: Record) -> None:
-    """Mark the target as lost; on the open plane, search around its predicted position."""
-    me.lost_step, me.goal_step = me.step, -1
-    if team.world.walled == 0 and me.fix_step >= 0:
-        me.area = me.target
-        me.seen[:] = 0
-
-
-@compiled
-def look_around(team: Team, me: Record, mates: Records) -> None:
-    """Update the map of areas covered by this tracker and those it hears."""
-    if team.world.searches == 0 or not is_due(team, me, _LOOK_TIME):
-        return
-    mark_seen(team, me, me.position)
-    for j in range(len(mates)):
-        if mates[j].step >= 0 and since(team, me, mates[j].step) <= team.settings.lost_after:
-            mark_seen(team, me, mates[j].position)
-
-
-@out_of_line
-def wander(team: Team, me: Record, mates: Records) -> complex:
-    """Return the velocity (m/s) of a tracker that searches."""
-    settings = team.settings
-    way = me.goal - me.position
-    near = settings.goal_reached * min(team.world.sight, 4.0)
-    time = since(team, me, me.goal_step)
-    arrived = dot(way, way) < near * near and time > _LOOK_TIME
-    if me.goal_step < 0 or arrived or time > settings.goal_time:
-        choose_goal(team, me, mates)
-        way = me.goal - me.position
-    return scaled(unit(way), me.max_speed)
-
-
-@compiled
-def age_of(team: Team, me: Record, i: int, j: int, lost: bool) -> float:
-    """Return the time (s) since a cell (i, j) was last covered, at most ``stale_after``.
-
-    With ``lost``, a cell not covered since the target was lost counts as never covered.
+    One that hears no other is drawn to the middle, where a report is likely heard. On the open plane a lost target is
+    searched for around its predicted position.
     """
-    stale = float(team.settings.stale_after)
-    # Signed: uncompiled, a cell that was never covered would count as one covered last.
-    looked = np.int64(me.seen[i * GRID + j]) - 1
-    if looked < 0 or (lost and looked < me.lost_step):
-        return stale
-    return min(float((me.step - looked) * team.world.dt), stale)
-
-
-@compiled
-def age_around(team: Team, me: Record, i: int, j: int) -> float:
-    """Return the mean age (s) of the cells in a square as wide as sight around a cell; outside, age is 0."""
-    world, total = team.world, 0.0
-    wide = max(1, round(_SWATH * world.sight / (2.0 * world.area_x / GRID)))
-    high = max(1, round(_SWATH * world.sight / (2.0 * world.area_y / GRID)))
-    for k in range(max(0, i - wide), min(GRID, i + wide + 1)):
-        for m in range(max(0, j - high), min(GRID, j + high + 1)):
-            total += age_of(team, me, k, m, False)
-    return float(total / ((2 * wide + 1) * (2 * high + 1)))
-
-
-@compiled
-def choose_goal(team: Team, me: Record, mates: Records) -> None:
-    """Set the goal: near, long not covered, and nearer to this tracker than to any other."""
     world, settings = team.world, team.settings
-    cell_x, cell_y = 2.0 * world.area_x / GRID, 2.0 * world.area_y / GRID
-    inner_x = world.area_x - min(_OFF_WALL, 0.5 * world.area_x)
-    inner_y = world.area_y - min(_OFF_WALL, 0.5 * world.area_y)
-    lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
-    deaf = 1.0 - me.others / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
-    best, me.goal, me.goal_step = -1e9, 0j, me.step
-    for i in range(GRID):
-        for j in range(GRID):
-            from_middle = complex(
-                clip((i + 0.5) * cell_x - world.area_x, -inner_x, inner_x),
-                clip((j + 0.5) * cell_y - world.area_y, -inner_y, inner_y),
-            )
-            place = me.area + from_middle
-            bonus, lost = 0.0, False
-            if me.fix_step >= 0:
-                # Near the last known position.
-                away = length(place - me.target)
-                if away < lost_within:
-                    bonus, lost = settings.lost_worth - _LOST_SLOPE * away, True
-            age = age_of(team, me, i, j, lost)
-            if settings.swath > 0.0:
-                age += settings.swath * (age_around(team, me, i, j) - age)
-            # A tracker that hears few others stays near the middle, where a report is likely heard.
-            bonus -= settings.middle_weight * deaf * length(place - me.area)
-            way = length(place - me.position)
-            turn = 1.0 - dot(unit(place - me.position), me.heading)
-            value = settings.age_weight * age + bonus - way - settings.turn_weight * turn
-            if value <= best:
-                continue  # team-mates can only reduce it
-            for m in range(len(mates)):
-                if mates[m].there:
-                    # A team-mate's goal counts more than its position.
-                    other = length(place - mates[m].place - scaled(mates[m].velocity, 2.0))
-                    if other < way:
-                        value -= way - other
-            if value > best:
-                best, me.goal = value, place
+    off = me.position - (me.target if world.walled == 0 and me.fix_step >= 0 else 0j)
+    way = complex(push_inwards(off.real, world.inner_x), push_inwards(off.imag, world.inner_y))
+    way = me.heading + scaled(way, _BORDER)
+    for j in range(len(mates)):
+        if mates[j].there:
+            way += push_from(mates[j].place - me.position, settings.apart)
+    if me.others == 0 and settings.radio and team.at.neighbours > 0:
+        way -= unit(off)
+    return scaled(unit(way), me.max_speed)

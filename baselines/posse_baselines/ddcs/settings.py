@@ -92,25 +92,8 @@ class Settings:
     """The same under PNGL, by which the range exceeds the wanted one: the chase begins again."""
 
     # searching
-    goal_time: float = tuned(4.0, "s", 0.5, 20.0)
-    """A goal is reconsidered at least this often."""
-    goal_reached: float = tuned(0.5, "", 0.1, 1.5)
-    """Share of the sensing range, counted up to 4 m, at which a goal is reached."""
-    stale_after: float = tuned(30.0, "s", 5.0, 60.0)
-    """A cell not covered for this long counts as never covered."""
-    age_weight: float = tuned(0.35, "m/s", 0.0, 2.0)
-    """Distance equivalent to a second since a cell was last covered."""
-    swath: float = tuned(0.0, "", 0.0, 1.0)
-    """Weight of the mean age of all cells in sight of a goal, the rest being that of the goal's own
-    cell: 0 heads for the nearest edge of what is not covered, 1 for its middle."""
-    turn_weight: float = tuned(0.8, "m", 0.0, 5.0)
-    """Distance equivalent to a turn by a right angle."""
-    lost_drift: float = tuned(0.35, "m/s", 0.0, 1.0)
-    """Growth rate of the area in which a lost target is searched first."""
-    lost_worth: float = tuned(6.0, "m", 0.0, 20.0)
-    """Distance equivalent to a cell in that area."""
-    middle_weight: float = tuned(0.5, "", 0.0, 3.0)
-    """Distance equivalent to a metre farther from the middle for a tracker that hears no other."""
+    apart: float = tuned(2.0, "m²", 0.0, 20.0)
+    """Push from a team-mate at a distance of 1 m, where the own heading pulls by 1; it falls as 1 / d²."""
 
     # slots
     replan_time: float = tuned(0.5, "s", 0.1, 3.0)
@@ -121,11 +104,6 @@ class Settings:
     """Bonus of a slot from which the target is in sight, as arrival time."""
     in_sight: float = tuned(0.95, "", 0.1, 1.0)
     """Share of the sensing range within which a slot counts as seeing the target."""
-    close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
-    """With a fix older than this, beyond the usual age, the team moves to a ring around the
-    predicted position of the target, to see it again."""
-    hunt_growth: float = tuned(0.3, "m/s", 0.0, 1.0)
-    """Growth rate of that ring."""
 
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)

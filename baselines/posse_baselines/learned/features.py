@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from posse.numeric import HALF, ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
+from posse_baselines.laws.exploration import push_from, push_inwards
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled
 from posse_baselines.laws.steering import Work, assign, slot_velocity
 
@@ -28,10 +29,9 @@ _GAIN: Final[Any] = np.float32(0.8)  # 1/s, of the slot law
 _TURN_GAIN: Final = np.float32(3.0)  # 1/s
 _FRAME_SHARE: Final = np.float32(0.8)  # of a tracker's speed above the target's, which the outermost slot may have
 _OLDEST: Final = np.float32(2.0)  # s; a position is extrapolated for this long at most
-_SPREAD: Final = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
+_SPREAD: Final[Any] = np.float32(2.0)  # m²; a team-mate d away pushes by this / d², the own heading pulls by 1
 _JUMP: Final = np.float32(1.0)  # m; a fix farther than this from where it was expected replaces the estimate
 _OUTSIDE: Final = np.float32(20.0)  # m; a slot in a wall counts as so much farther
-_CLOSE: Final = np.float32(0.5)  # m
 _FIRST: Final = 1e3  # m; by so much the first slot counts as nearer where it is filled at any rate
 
 MOST: Final = 16
@@ -175,20 +175,12 @@ def _explore(row: FloatArray, f: Record, team: Record) -> complex:
     """Return the direction in which a tracker explores: ahead, away from team-mates and from walls."""
     way = complex(1.0, 0.0)
     for j in range(1, team.count):
-        d: Any = max(length(team.places[j]), _CLOSE)
-        way -= scaled(team.places[j], _SPREAD / (d * d * d))
+        way += push_from(team.places[j], _SPREAD)
     if row[f.arena] > 0.0:
-        place = pair(row, f.position)
-        inwards = complex(_inwards(place.real, row[f.arena]), _inwards(place.imag, _height(row, f)))
+        place, x, y = pair(row, f.position), 0.25 * row[f.arena], 0.25 * _height(row, f)
+        inwards = complex(push_inwards(place.real, x), push_inwards(place.imag, y))
         way += inwards * pair(row, f.heading).conjugate()
     return _soft(way, _SMALL)
-
-
-@compiled
-def _inwards(x: float, side: float) -> float:
-    """Return the push from the wall nearer to ``x``, of two that are ``side`` (m) apart: none from half way to it."""
-    push = min(max(0.5 * (abs(x) - 0.25 * side), 0.0), 1.0)
-    return -push if x > 0.0 else push
 
 
 @compiled
