@@ -7,10 +7,10 @@ create a higher term: the leader finds another tracker clearly nearer to the tar
 and appoints the nearest one that it knows. A connected radio graph thus converges to one claim, and
 two parts that meet again agree on the higher one.
 
-There is a leader from the first step on. While the target is unknown, it is the most central
-tracker of those that hear each other. A tracker that hears no other leads itself (rule ii) under a
-lower term, so that it yields when it meets a group. The leader counts its steps in its message, and the others relay
-the highest count, so that trackers several hops away know that the leader is alive.
+There is a leader from the first step on: while the target is unknown, every tracker appoints itself, and the lowest
+number wins. A tracker that hears no other leads itself (rule ii) under a lower term, so that it yields when it meets a
+group. The leader counts its steps in its message, and the others relay the highest count, so that trackers several hops
+away know that the leader is alive.
 
 **Slots.** Each tracker assigns all known trackers and takes its own slot. Trackers with equal knowledge get equal
 results. Otherwise, for example after lost messages, slots claimed in messages are respected (``loyalty``), and of two
@@ -69,22 +69,6 @@ def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]
     return best, least
 
 
-@out_of_line
-def central_tracker(team: Team, me: Record, mates: Records) -> int:
-    """Return the tracker with the least sum of distances to all heard."""
-    best, least = int(me.number), 1e30
-    for i in range(len(mates)):
-        if i == me.number or mates[i].there:
-            total = 0.0
-            for j in range(len(mates)):
-                if j == me.number or mates[j].there:
-                    total += length(mates[i].place - mates[j].place)
-            # Ties within rounding go to the lower number.
-            if total < least - 1e-3:
-                best, least = i, total
-    return best
-
-
 @compiled
 def select_leader(team: Team, me: Record, mates: Records) -> None:
     """Appoint a tracker other than the leader under a new term."""
@@ -93,9 +77,6 @@ def select_leader(team: Team, me: Record, mates: Records) -> None:
         best, _ = nearest_tracker(team, me, mates)
     elif me.others == 0:
         term = me.term - 1
-    else:
-        central = central_tracker(team, me, mates)
-        best = central if central != me.leader else best
     appoint(me, best, term % COUNT, 0)
 
 
