@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Final
 
 from posse import declarations
-from posse.adapters import register as _register
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.robot import Command, Heard, Robot, TargetFix
 from posse.declarations import (
@@ -36,8 +35,6 @@ METRICS: Final[tuple[Metric, ...]] = declarations.METRICS.built_in()
 """Every built-in metric, in the order in which they are reported."""
 REWARD_TERMS: Final[tuple[RewardTerm, ...]] = declarations.REWARD_TERMS.built_in()
 """The built-in reward terms, in the order in which they are reported."""
-
-_register()
 
 
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:

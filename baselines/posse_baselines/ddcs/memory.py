@@ -21,7 +21,7 @@ from posse import ObservationLayout, Scenario
 from posse.declarations import FIELDS
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import beam_directions
-from posse.scenarios.setting import OPEN_PLANE_EXTENT
+from posse.scenarios.scenario import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY, UNLIMITED
 from posse_baselines.laws.steering import Work, work_for

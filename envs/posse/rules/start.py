@@ -19,10 +19,9 @@ from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_ke
 from posse.rules.state import WorldArrays
 from posse.rules.targets.steering import free_circles
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.setting import START_CLEARANCE
 
 _TRIES: Final = 2000
-_CLEARANCE: Final = np.float32(START_CLEARANCE)
+_CLEARANCE: Final = np.float32(0.2)  # m, least between robots, and between a robot and an obstacle
 _ROUNDING: Final = np.float32(1e-3)  # m; a given pose is rounded to float32
 _OBSTACLES: Final = 1
 _TARGET: Final = 2

@@ -22,8 +22,7 @@ import numpy.typing as npt
 from posse.declarations import METRICS, SENSORS, TARGET_MOTIONS, Metric, TargetMotion
 from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
-from posse.scenarios.scenario import FORMATIONS
-from posse.scenarios.setting import FAR, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
+from posse.scenarios.scenario import FAR, FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
 BIT: Final = np.uint64(1)

@@ -23,7 +23,7 @@ from posse.declarations import FIELDS, TARGET_MOTIONS, Field, fields_of
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario
-from posse.scenarios.setting import SLACK
+from posse.scenarios.scenario import SLACK
 
 _SONAR = (
     "Distance from its rim to the nearest disc or wall along each beam, from straight ahead to the left; "

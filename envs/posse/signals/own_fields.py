@@ -16,8 +16,7 @@ from posse.declarations import field
 from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
-from posse.scenarios.scenario import FORMATIONS
-from posse.scenarios.setting import FAR, SLACK
+from posse.scenarios.scenario import FAR, FORMATIONS, SLACK
 from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]

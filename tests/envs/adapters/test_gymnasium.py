@@ -4,7 +4,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import pettingzoo
 import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import render_test
@@ -12,7 +11,6 @@ from tests.support.adapters import f32
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse.adapters.pettingzoo_env import TeamParallelEnv
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 
@@ -59,11 +57,3 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
         assert np.array_equal(plain.state(), discrete.state())
     for number, motion in enumerate(MOTIONS):
         assert tuple(motion) == (number // 5 - 1, (number % 5 - 2) / 2)
-
-
-@pytest.mark.skipif(not hasattr(pettingzoo, "parallel_registry"), reason="PettingZoo has a registry since 1.27")
-def test_the_registry_makes_both_kinds() -> None:
-    parallel = pettingzoo.make("parallel", "posse/track-v0", scenario="smart", num_trackers=3)
-    assert isinstance(parallel, TeamParallelEnv)
-    assert len(parallel.possible_agents) == 3
-    assert isinstance(pettingzoo.make("aec", "posse/track-v0", horizon=5), pettingzoo.AECEnv)

@@ -32,7 +32,7 @@ def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(name: str
         world = one_world(state, e)
         gaps = free_gaps(s, world)
         gaps[:, s.num_trackers] = np.inf  # the target, for which start_distance counts
-        assert gaps.min() > 0.19, "START_CLEARANCE"
+        assert gaps.min() > 0.19, "0.2 m but for rounding"
         away = np.hypot(world["tracker_x"] - world["world_x"], world["tracker_y"] - world["world_y"])
         assert away.min() >= least - 1e-4
         assert away.max() <= most + 1e-4

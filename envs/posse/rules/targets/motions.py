@@ -11,7 +11,7 @@ from posse.declarations import Memory, target_motion
 from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
-from posse.scenarios.setting import SLACK
+from posse.scenarios.scenario import SLACK
 
 _LEAST_RATE: Final = 0.2  # rad/s
 _MOST_RATE: Final = 0.8

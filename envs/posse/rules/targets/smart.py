@@ -16,7 +16,7 @@ from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compile
 from posse.numeric.lanes import choose, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
-from posse.scenarios.setting import SLACK
+from posse.scenarios.scenario import SLACK
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
