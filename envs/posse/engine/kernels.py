@@ -111,8 +111,8 @@ def end_step(c: Record, w: Record, trackers: Records, slots: Records, made: Gene
     made.add_to_sums(c, w, trackers, slots)
     settle(c, w)
     if c.terminate_on_contact:
-        for i in range(c.num_trackers):
-            if trackers[i].touching:
+        for t in trackers:
+            if t.touching:
                 w.terminated = 1
     w.over = w.terminated != 0 or w.step >= c.horizon
 
@@ -266,7 +266,7 @@ def first_bad_start(config: Records, world: Records, tracker: Records, obstacle:
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
         for i in range(n + 1 if chosen[e] else 0):
             x, y = (trackers[i].x, trackers[i].y) if i < n else (w.x, w.y)
-            if not is_clear(c, trackers, i, obstacles, x, y, zero):
+            if not is_clear(c, trackers[:i], obstacles, x, y, zero):
                 return int(e * (n + 2) + i)
         if chosen[e] and c.target_speed > 0 and not target_can_turn(c, w, obstacles):
             return int(e * (n + 2) + n + 1)

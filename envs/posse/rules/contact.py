@@ -13,7 +13,7 @@ import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, compiled, greater, lesser, out_of_line, root
 from posse.numeric.lanes import bits, least, load
-from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
+from posse.rules.discs import TOUCHING_GAP, surroundings_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -60,7 +60,7 @@ def free_of_robots(
     The positions of ``count`` robots are in ``s.near_x`` and ``s.near_y``; the robot itself may be among them.
     """
     reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
-    for k in range(0, WIDTH * blocks(count), WIDTH):
+    for k in range(0, count, WIDTH):
         share = min(share, least(free_share(x, y, dx, dy, load(s.near_x, k), load(s.near_y, k), reach)))
     return np.float32(share)
 
@@ -71,8 +71,7 @@ def free_of_surroundings(
 ) -> np.float32:
     """Return the share of a robot's move that neither obstacles nor walls block."""
     share = ONE
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for o in obstacles:
         share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.robot_radius + o.radius + BLOCKING_GAP))
     if c.walled:
         share = min(share, free_share_wall(x, dx, c.half_width - c.robot_radius - BLOCKING_GAP))
@@ -91,8 +90,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     touch = c.robot_radius + c.robot_radius + TOUCHING_GAP
     smallest, before = w.least_gap, w.contacts_target
     target_touching, target_near = NO_BITS, False
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         wall = min(inner_x - abs(t.x), inner_y - abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
@@ -140,8 +138,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         w.contacts_target += 1
     # Other trackers.
     found = 0
-    for block in range(blocks(c.num_trackers)):
-        j = WIDTH * block
+    for j in range(0, c.num_trackers, WIDTH):
         x, y = load(s.x, j) - t.x, load(s.y, j) - t.y
         other = load(s.index, j) < np.float32(c.num_trackers)
         found |= bits((x * x + y * y <= touch * touch) & other) << j
@@ -152,8 +149,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
     t.touching_trackers = touching
     # Obstacles and walls.
     touching = NO_BITS
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for k, o in enumerate(obstacles):
         dx, dy, reach = o.x - t.x, o.y - t.y, c.robot_radius + o.radius + TOUCHING_GAP
         if dx * dx + dy * dy <= reach * reach:
             touching |= BIT << np.uint64(k)

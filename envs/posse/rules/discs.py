@@ -24,16 +24,9 @@ _MINUS_ONE: Final = np.float32(-1.0)
 
 
 @compiled
-def blocks(count: int) -> int:
-    """Return the number of blocks for ``count`` discs or beams."""
-    return (count + (WIDTH - 1)) >> 3
-
-
-@compiled
-def obstacle_within(obstacles: Records, count: int, x: np.float32, y: np.float32, reach: np.float32) -> bool:
-    """Return whether the rim of one of the first ``count`` obstacles is nearer than ``reach`` to a point."""
-    for k in range(count):
-        o = obstacles[k]
+def obstacle_within(obstacles: Records, x: np.float32, y: np.float32, reach: np.float32) -> bool:
+    """Return whether the rim of an obstacle is nearer than ``reach`` to a point."""
+    for o in obstacles:
         dx, dy, within = o.x - x, o.y - y, o.radius + reach
         if dx * dx + dy * dy < within * within:
             return True
@@ -49,7 +42,7 @@ def to_wall(c: Record, x: np.float32, y: np.float32) -> np.float32:
 @compiled
 def surroundings_within(c: Record, obstacles: Records, x: np.float32, y: np.float32, reach: np.float32) -> bool:
     """Return whether a wall, or the rim of an obstacle, is nearer than ``reach`` to a point."""
-    return bool(to_wall(c, x, y) < reach or obstacle_within(obstacles, c.num_obstacles, x, y, reach))
+    return bool(to_wall(c, x, y) < reach or obstacle_within(obstacles, x, y, reach))
 
 
 @compiled
@@ -102,15 +95,13 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
     # Padding first: a load of a block that covers two stores would have to wait for them.
     store(s.x, num_discs(c), eight(FAR))
     store(s.y, num_discs(c), eight(FAR))
-    for block in range(blocks(n + 1)):
-        j = WIDTH * block
+    for j in range(0, n + 1, WIDTH):
         pose = Pose(*columns(trackers, j, n, POSE))
         number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))
         store(s.y, j, choose(tracker, pose.y, choose(target, w.y, FAR)))
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for k, o in enumerate(obstacles):
         j = n + 1 + k
         s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
 
@@ -138,8 +129,7 @@ def find_gaps(c: Record, s: Record) -> None:
     tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.control_step
     target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.control_step
     margin = TOUCHING_GAP + c.fastest * c.control_step
-    for block in range(blocks(n)):
-        i = WIDTH * block
+    for i in range(0, n, WIDTH):
         x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)
         # All robots have one radius, so the nearest is found without a square root for each.
         nearest2 = eight(FAR)

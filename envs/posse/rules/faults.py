@@ -34,8 +34,7 @@ def _drawn_outage(c: Record, w: Record, chance: np.float32, looked: int, index: 
 @compiled
 def draw_faults(c: Record, w: Record, trackers: Records) -> None:
     """Draw the faults of an episode."""
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         t.broken_at, t.breaks_at = NEVER, NEVER
         t.sensor_dead_from, t.radio_dead_from = NEVER, NEVER
     w.breaks_left, w.break_step = c.breaks, NEVER
@@ -50,8 +49,7 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
     both are 0 at its start. Faults that have begun are unchanged.
     """
     n = c.num_trackers
-    for i in range(n):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         if t.sensor_dead_from >= looked:
             t.sensor_dead_from = _drawn_outage(c, w, c.sensor_outages, looked, _PER_TRACKER * i)
         if t.radio_dead_from >= looked:
@@ -95,8 +93,7 @@ def apply_faults(c: Record, w: Record, trackers: Records) -> None:
         if w.step < w.break_step:
             return
         nearest, least = -1, np.float32(np.inf)
-        for i in range(c.num_trackers):
-            t = trackers[i]
+        for i, t in enumerate(trackers):
             dx, dy = t.x - w.x, t.y - w.y
             d2 = dx * dx + dy * dy
             if t.broken_at == NEVER and d2 < least:
@@ -107,8 +104,7 @@ def apply_faults(c: Record, w: Record, trackers: Records) -> None:
         # Several break in sequence, each when it is nearest.
         w.break_step = _drawn_step(c, w, w.step + 1, _BREAKS + w.breaks_left)
         return
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         if t.broken_at == NEVER and w.step >= t.breaks_at:
             break_tracker(w, t)
             w.breaks_left -= 1

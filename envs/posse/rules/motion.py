@@ -14,7 +14,7 @@ import numpy as np
 from posse.numeric import HALF, ONE, WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, out_of_line
 from posse.numeric.lanes import eight, greater, lesser, load, store, store_fields
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import FAR, blocks, columns, write_block
+from posse.rules.discs import FAR, columns, write_block
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.randomness import DRIFT, normal_pair
 from posse.rules.state import NEVER, POSE, Pose, WorldArrays
@@ -48,8 +48,7 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s
     The other robots cannot block them.
     """
     near = 0
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         s.near[near], s.near_x[near], s.near_y[near] = np.float32(i), t.x, t.y
         near += t.near != 0
     s.near_x[near], s.near_y[near] = w.x, w.y
@@ -105,8 +104,7 @@ def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray
 def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
     n = c.num_trackers
-    for block in range(blocks(n)):
-        i = WIDTH * block
+    for i in range(0, n, WIDTH):
         pose = Pose(*columns(trackers, i, n, POSE))
         x, y, cosine, sine = pose.x, pose.y, pose.heading_cos, pose.heading_sin
         speed, turn_rate = pose.speed, pose.turn_rate
@@ -119,8 +117,7 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
         moved = x, y, cosine, sine, speed, turn_rate, pose.max_speed, pose.max_turn_rate
         write_block(moved, 0, s.new_pose[i:])
     others = False
-    for i in range(n):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         if t.broken_at == NEVER:
             if t.near == 0:
                 store_fields(t, POSE, load(s.new_pose[i], 0))
@@ -167,8 +164,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
 @out_of_line
 def drift(c: Record, w: Record, odometry: Records) -> None:
     """Let each tracker's own pose, as it knows it, take a step of its random walk."""
-    for i in range(c.num_trackers):
-        o = odometry[i]
+    for i, o in enumerate(odometry):
         along, across = normal_pair(w.key, w.step, DRIFT, 2 * i)
         about, _ = normal_pair(w.key, w.step, DRIFT, 2 * i + 1)
         o.x += c.position_step * along

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
-from posse.rules.discs import blocks, find_slots
+from posse.rules.discs import find_slots
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NEVER, NO_BITS
 
@@ -27,14 +27,12 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    n = c.num_trackers
-    for block in range(blocks(n)):
-        find_slots(c, w, WIDTH * block, slots, NO_BITS, s)
     taken = NO_BITS
+    for first in range(0, c.num_trackers, WIDTH):
+        find_slots(c, w, first, slots, taken, s)
     occupied = 0
     near2 = c.tolerance * c.tolerance
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         t.slot = -1
         # Until all slots taken are known, the distance to the nearest one of all.
         t.slot_progress = t.slot_distance
@@ -47,10 +45,9 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 occupied += 1
                 t.slot = best
     if taken != NO_BITS:
-        for block in range(blocks(n)):
-            find_slots(c, w, WIDTH * block, slots, taken, s)
-    for i in range(c.num_trackers):
-        t = trackers[i]
+        for first in range(0, c.num_trackers, WIDTH):
+            find_slots(c, w, first, slots, taken, s)
+    for i, t in enumerate(trackers):
         if t.slot < 0 and s.slot[i] >= ZERO:
             t.slot_distance = s.slot_distance[i]
         t.slot_progress -= t.slot_distance

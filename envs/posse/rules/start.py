@@ -32,21 +32,15 @@ _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come fir
 
 @compiled
 def is_clear(
-    c: Record,
-    trackers: Records,
-    placed: int,
-    obstacles: Records,
-    x: np.float32,
-    y: np.float32,
-    clearance: np.float32 = _CLEARANCE,
+    c: Record, others: Records, obstacles: Records, x: np.float32, y: np.float32, clearance: np.float32 = _CLEARANCE
 ) -> bool:
-    """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
+    """Return whether a robot at (x, y) is clear of walls, obstacles and other trackers."""
     if surroundings_within(c, obstacles, x, y, c.robot_radius + clearance):
         return False
     reach = c.robot_radius + c.robot_radius + clearance
-    for j in range(placed):
-        t = trackers[j]
-        if (t.x - x) * (t.x - x) + (t.y - y) * (t.y - y) < reach * reach:
+    for t in others:
+        dx, dy = t.x - x, t.y - y
+        if dx * dx + dy * dy < reach * reach:
             return False
     return True
 
@@ -64,8 +58,7 @@ def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.floa
 def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
     """Draw the obstacles, ``obstacle_gap`` apart and clear of the walls."""
     index, clear = 0, True
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for k, o in enumerate(obstacles):
         o.radius = between(c.obstacle_radius_least, c.obstacle_radius_most, w.key, 0, OBSTACLES, index)
         room_x, room_y = c.half_width - o.radius - c.obstacle_gap, c.half_height - o.radius - c.obstacle_gap
         for _ in range(_TRIES if clear else 0):
@@ -73,7 +66,7 @@ def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
             o.y = between(-room_y, room_y, w.key, 0, OBSTACLES, index + 2)
             index += 3
             clear = min(room_x, room_y) > ZERO
-            clear = clear and not obstacle_within(obstacles, k, o.x, o.y, o.radius + c.obstacle_gap)
+            clear = clear and not obstacle_within(obstacles[:k], o.x, o.y, o.radius + c.obstacle_gap)
             if clear:
                 break
     if not clear:
@@ -89,7 +82,7 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
         heading = TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
-        clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + _CLEARANCE)
+        clear = not obstacle_within(obstacles, w.x, w.y, c.robot_radius + _CLEARANCE)
         if clear and target_can_turn(c, w, obstacles, ZERO):
             return
     w.undrawn |= _TARGET
@@ -99,15 +92,14 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
 def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Draw the trackers' poses round the target, uniform in distance, bearing and heading."""
     index, clear = _TRACKER_DRAWS, True
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         for _ in range(_TRIES if clear else 0):
             distance = between(c.start_distance_least, c.start_distance_most, w.key, 0, START, index)
             bearing = TWO_PI * uniform(w.key, 0, START, index + 1)
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
-            clear = is_clear(c, trackers, i, obstacles, t.x, t.y)
+            clear = is_clear(c, trackers[:i], obstacles, t.x, t.y)
             if clear:
                 break
         heading = TWO_PI * uniform(w.key, 0, START, index)
@@ -143,8 +135,7 @@ def begin(c: Record, worlds: WorldArrays, e: int) -> None:
     w.settled_at, w.detected_at, w.lost_at, w.recovered_at = -1, -1, -1, -1
     w.contacts_tracker, w.contacts_obstacle, w.contacts_target = 0, 0, 0
     w.least_gap = np.float32(1e6)
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         t.speed, t.turn_rate = ZERO, ZERO
         t.sees, t.touching, t.onsets = 0, 0, 0
         t.touching_trackers, t.touching_obstacles = np.uint64(0), np.uint64(0)

@@ -41,8 +41,7 @@ def safe_score(c: Record, w: Record) -> np.float32:
 def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32:
     """Upper bound of the score: every tracker drives straight to a slot and then stays in it."""
     count = 0
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         if t.broken_at == NEVER:
             if t.could_arrive == 0:
                 t.could_arrive = could_arrive(c, w, t, slots)

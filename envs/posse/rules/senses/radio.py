@@ -33,8 +33,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
         if trackers[i].fix_step > trackers[best].fix_step:
             best = i
     b = trackers[best]
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         if t.fix_step < b.fix_step:
             take_fix(c, t, b)
 
@@ -80,8 +79,7 @@ def hear(
     slot = sent_at % (c.radio_delay + 1)
     reach2 = c.radio_range * c.radio_range
     n = c.num_trackers
-    for i in range(n):
-        t = trackers[i]
+    for i, t in enumerate(trackers):
         if not radio_works(c, w, t):
             continue
         for j in range(n):
@@ -120,8 +118,7 @@ def connected(c: Record, w: Record, trackers: Records) -> bool:
     reached, before = working & (~working + BIT), NO_BITS  # at first the lowest number
     while reached != before:
         before = reached
-        for i in range(c.num_trackers):
-            t = trackers[i]
+        for i, t in enumerate(trackers):
             if reached & (BIT << np.uint64(i)) == NO_BITS or not radio_works(c, w, t):
                 continue
             for j in range(c.num_trackers):

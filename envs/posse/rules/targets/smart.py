@@ -91,8 +91,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
     danger = max(_DANGER * c.formation_distance, c.robot_radius + c.robot_radius)
     vx, vy = c.target_speed * w.heading_cos, c.target_speed * w.heading_sin
     committed = ZERO
-    for i in range(c.num_trackers):
-        t = trackers[i]
+    for t in trackers:
         if t.broken_at != NEVER:
             continue
         slow = _STATION_SPEED * (t.max_speed - c.target_speed)
@@ -123,8 +122,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     for side in range(2):  # half the directions, then the opposite ones
         ux, uy = _SIDES[side] * load(_DIRECTION_COS, 0), _SIDES[side] * load(_DIRECTION_SIN, 0)
         latest = eight(_FAR)
-        for i in range(c.num_trackers):
-            t = trackers[i]
+        for t in trackers:
             if t.broken_at != NEVER:
                 # A broken tracker is only an obstacle.
                 px, py = t.x - w.x, t.y - w.y
@@ -159,8 +157,7 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     inner = c.half_height - c.safe_distance
     if abs(uy) > TINY:
         far = min(far, (inner - w.y) / uy if uy > ZERO else (-inner - w.y) / uy)
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for o in obstacles:
         ox, oy = o.x - w.x, o.y - w.y
         along, across = ox * ux + oy * uy, ox * uy - oy * ux
         reach = o.radius + c.safe_distance
@@ -182,8 +179,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
     for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         value = ZERO
-        for i in range(c.num_trackers):
-            t = trackers[i]
+        for t in trackers:
             hc, hs, tc, ts = w.heading_cos, w.heading_sin, t.heading_cos, t.heading_sin
             moved_x, moved_y = ZERO, ZERO  # displacement relative to the target
             for _ in range(_DART_MOMENTS):

@@ -106,8 +106,7 @@ def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
 def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
     """Return the distance from a point to the nearest obstacle or wall, m."""
     width = to_wall(c, x, y)
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
+    for o in obstacles:
         dx, dy = o.x - x, o.y - y
         width = min(width, np.float32(math.sqrt(dx * dx + dy * dy)) - o.radius)
     return np.float32(width)
