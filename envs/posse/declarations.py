@@ -82,6 +82,7 @@ class Declaration:
         kind: Name of the kind for messages, such as ``"reward term"``.
         signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
             All but ``function`` may be ``None``.
+        choices: The values that other attributes may have.
 
     Raises:
         DeclarationError: A function has no docstring or other parameters, or another attribute is invalid.
@@ -92,6 +93,7 @@ class Declaration:
     function: Function
     kind: ClassVar[str]
     signatures: ClassVar[Mapping[str, tuple[str, str]]]
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
         for attribute, (allowed, _) in self.signatures.items():
@@ -106,6 +108,9 @@ class Declaration:
             raise self.error("its docstring, which must state its meaning, is missing")
         if not isinstance(unit, str) or not unit:
             raise self.error(f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
+        for attribute, choices in self.choices.items():
+            if getattr(self, attribute) not in choices:
+                raise self.error(f"unknown {attribute}={getattr(self, attribute)!r}; allowed: {', '.join(choices)}")
 
     def _checked(self, function: Any, allowed: str) -> Function:
         """Return a function, compiled if kernels call it; raise DeclarationError if it has other parameters."""
@@ -128,32 +133,12 @@ class Declaration:
     def functions(self) -> dict[Function, str]:
         """The functions for compiled code, and what each returns."""
         functions = ((getattr(self, attribute), returns) for attribute, (_, returns) in self.signatures.items())
-        return {function: returns for function, returns in functions if function is not None}
+        return {function: returns for function, returns in functions if function and parameters_of(function)[0] == "c"}
 
     @property
     def built_in(self) -> bool:
         """Whether posse itself declares it."""
         return str(plain(self.function).__module__).partition(".")[0] == _PACKAGE
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the function's parameters."""
-        return parameters_of(self.function)
-
-    def bounds(self, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
-        """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""
-        values = []
-        for name, bound in (("low", low), ("high", high)):
-            try:
-                value = bound(scenario) if callable(bound) else bound
-            except Exception as error:  # a user's function
-                raise self.error(f"{name}{of} in {scenario.name!r}: {error!r}") from error
-            if not is_number(value):
-                raise self.error(f"{name}={value!r}{of} in {scenario.name!r} is not a finite number")
-            values.append(float(value))
-        if values[0] > values[1]:
-            raise self.error(f"low={values[0]:g}{of} is above high={values[1]:g} in {scenario.name!r}")
-        return values
 
     def error(self, reason: str, function: Any = None) -> DeclarationError:
         """Return the error for an invalid declaration, or for one of its further functions."""
@@ -262,7 +247,7 @@ class FieldDeclaration(Declaration):
     @property
     def of_mate(self) -> bool:
         """Whether it describes a team-mate."""
-        return "m" in self.parameters
+        return "m" in parameters_of(self.function)
 
     @property
     def functions(self) -> dict[Function, str]:
@@ -271,12 +256,25 @@ class FieldDeclaration(Declaration):
 
     def of(self, scenario: Any) -> Field:
         """Return the field in a scenario; raise DeclarationError if its bounds or its value for "unknown" are wrong."""
-        low, high = self.bounds(self.low, self.high, scenario)
+        low, high = self._bound("low", scenario), self._bound("high", scenario)
+        if low > high:
+            raise self.error(f"low={low:g} is above high={high:g} in {scenario.name!r}")
         empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
         if empty is not None and not (is_number(empty) and low <= empty <= high):
             where = f"between low={low:g} and high={high:g} in {scenario.name!r}"
             raise self.error(f"unknown={empty!r} is not a number {where}")
         return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
+
+    def _bound(self, name: str, scenario: Any) -> float:
+        """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""
+        bound = getattr(self, name)
+        try:
+            value = bound(scenario) if callable(bound) else bound
+        except Exception as error:  # a user's function
+            raise self.error(f"{name} in {scenario.name!r}: {error!r}") from error
+        if not is_number(value):
+            raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
+        return float(value)
 
 
 def field(
@@ -324,7 +322,7 @@ class RewardTerm(Declaration):
     @property
     def of_target(self) -> Function | None:
         """The function for a target that is an agent; ``None``: it has none."""
-        return self.function if self.target is None and "t" not in self.parameters else self.target
+        return self.function if self.target is None and "t" not in parameters_of(self.function) else self.target
 
 
 def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
@@ -354,28 +352,19 @@ class Metric(Declaration):
         "function": ("(c, w) or (c, w, t) or (c, w, trackers) or (c, w, trackers, slots) or (s, w)", "a number")
     }
 
-    per: str
+    choices: ClassVar = {"per": tuple(_STEPS)}
 
-    def __post_init__(self) -> None:
-        """Raise DeclarationError also if the divisor is unknown."""
-        super().__post_init__()
-        if self.per not in tuple(_STEPS):
-            raise self.error(f"unknown per={self.per!r}; allowed: {', '.join(_STEPS)}")
+    per: str
 
     @property
     def summed(self) -> bool:
         """Whether its function is compiled, and its values are summed over the steps."""
-        return self.parameters[0] == "c"
+        return parameters_of(self.function)[0] == "c"
 
     @property
     def sum_name(self) -> str:
         """Name of the field of the world's record that holds the sum."""
         return f"{self.name}_sum"
-
-    @property
-    def functions(self) -> dict[Function, str]:
-        """Its function, if that is compiled, and what it returns."""
-        return super().functions if self.summed else {}
 
     def of(self, scenario: Any, worlds: Records) -> npt.NDArray[np.float64]:
         """Return the metric of the current episodes, (E,)."""
@@ -413,15 +402,10 @@ def metric(unit: str, *, per: str = "step") -> Decorator:
 
 
 class Memory(NamedTuple):
-    """A state variable of a motion: a float32 of the world's record, 0 at the start.
-
-    It is part of the global state, within its bounds: numbers, or functions of the scenario.
-    """
+    """A state variable of a motion: a float32 of the world's record, 0 at the start, and part of the global state."""
 
     name: str
     unit: str
-    low: Bound
-    high: Bound
     meaning: str
 
 
@@ -454,11 +438,6 @@ class TargetMotion(Declaration):
             if not isinstance(each.name, str) or not each.name.isidentifier() or keyword.iskeyword(each.name):
                 raise self.error(f"invalid name {each.name!r} of a memory: use a name that Python allows")
 
-    def check(self, scenario: Any) -> None:
-        """Raise DeclarationError unless the bounds of its memory are finite and in order in a scenario."""
-        for each in self.memory:
-            self.bounds(each.low, each.high, scenario, f" of memory {each.name!r}")
-
 
 def target_motion(
     name: str, *, draw: Function | None = None, memory: Sequence[Memory] = (), mirrored: bool = True
@@ -475,15 +454,8 @@ def target_motion(
         draw: A function ``(c, w)`` that draws the parameters of an episode.
         memory: Its state variables, fields of ``w``.
         mirrored: Whether the goal is mirrored near walls; not needed by a motion that avoids them.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, or an argument or the
-            parameters of a function are wrong.
     """
     return TARGET_MOTIONS.decorator(name=name, draw=draw, memory=memory, mirrored=mirrored)
-
-
-FIX_KINDS: Final = ("position", "bearing")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -499,14 +471,10 @@ class Sensor(Declaration):
         "measure": ("(c, w, number, dx, dy)", "2 numbers"),
     }
 
+    choices: ClassVar = {"fix": ("position", "bearing")}
+
     measure: Function | None
     fix: str
-
-    def __post_init__(self) -> None:
-        """Raise DeclarationError also if there is no such kind of fix."""
-        super().__post_init__()
-        if self.fix not in FIX_KINDS:
-            raise self.error(f"unknown fix={self.fix!r}; allowed: {', '.join(FIX_KINDS)}")
 
 
 def sensor(name: str, *, measure: Function | None = None, fix: str = "position") -> Decorator:
@@ -529,10 +497,6 @@ def sensor(name: str, *, measure: Function | None = None, fix: str = "position")
             target, which returns the measured vector. Default: the true one with the scenario's
             ``range_noise`` and ``bearing_noise``.
         fix: The kind of a fix, ``"position"`` or ``"bearing"``.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, the parameters are others, or
-            there is no such kind.
     """
     return SENSORS.decorator(name=name, measure=measure, fix=fix)
 
@@ -544,7 +508,24 @@ SENSORS: Final = Registry(Sensor)
 TARGET_MOTIONS: Final = Registry(TargetMotion)
 
 
-def fields_of(scenario: Any) -> tuple[FieldDeclaration, ...]:
-    """Return the observation fields of a scenario, except sonar and messages, in order."""
-    declared = FIELDS.with_added(*scenario.extra_fields)
-    return tuple(field for field in declared if field.when is None or field.when(scenario))
+class Declarations(NamedTuple):
+    """The declarations of a scenario, each kind in order of evaluation: the built-in ones, and those that it names."""
+
+    fields: tuple[FieldDeclaration, ...]
+    """Observation fields, except sonar and messages."""
+    motions: tuple[TargetMotion, ...]
+    sensors: tuple[Sensor, ...]
+    metrics: tuple[Metric, ...]
+    reward_terms: tuple[RewardTerm, ...]
+
+    @classmethod
+    def of(cls, scenario: Any) -> Declarations:
+        """Return the declarations of a scenario."""
+        fields = FIELDS.with_added(*scenario.extra_fields)
+        return cls(
+            tuple(field for field in fields if field.when is None or field.when(scenario)),
+            TARGET_MOTIONS.with_added(scenario.target_motion),
+            SENSORS.with_added(scenario.sensor),
+            METRICS.with_added(*scenario.metrics),
+            REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
+        )

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.declarations import Declarations
 from posse.engine.arguments import as_float32, check_choice, check_count, in_box, mask_of, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
@@ -34,7 +35,6 @@ from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
-from posse.signals.generate import declarations_for
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
 
@@ -107,7 +107,7 @@ class Batch(OwnArrays):
         self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
-        self.term_names = tuple(term.name for term in declarations_for(scenario).reward_terms)
+        self.term_names = tuple(term.name for term in Declarations.of(scenario).reward_terms)
         self._rewards = tuple((f"reward/{name}", k) for k, name in enumerate(self.term_names))
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
@@ -124,7 +124,7 @@ class Batch(OwnArrays):
 
     def _prepare(self) -> None:
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
-        self._declared = declarations_for(self.scenario)
+        self._declared = Declarations.of(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)

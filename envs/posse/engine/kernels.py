@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import RewardTerm
+from posse.declarations import Declarations, RewardTerm
 from posse.numeric import ONE, UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.numeric.compile import stamp
 from posse.numeric.lanes import fetch
@@ -32,7 +32,7 @@ from posse.rules.senses.sonar import listen
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import WorldArrays, config_record, new_scratch, slot_records
 from posse.scenarios import Scenario
-from posse.signals.generate import Declarations, generated_for
+from posse.signals.generate import generated_for
 from posse.signals.user_functions import check_functions
 from posse.signals.views import Generated, observe_together
 

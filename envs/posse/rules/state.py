@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import METRICS, SENSORS, TARGET_MOTIONS, Metric, TargetMotion
+from posse.declarations import SENSORS, TARGET_MOTIONS, Declarations
 from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
 from posse.scenarios.scenario import FAR, FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
@@ -253,14 +253,15 @@ def world_record(scenario: Scenario) -> np.dtype[Any]:
     It includes the memories of the target motions and the sums of the metrics, both of the built-in
     ones and of those that the scenario names.
     """
-    return world_record_of(TARGET_MOTIONS.with_added(scenario.target_motion), METRICS.with_added(*scenario.metrics))
+    return world_record_of(Declarations.of(scenario))
 
 
 @functools.cache
-def world_record_of(motions: tuple[TargetMotion, ...], metrics: tuple[Metric, ...]) -> np.dtype[Any]:
+def world_record_of(declared: Declarations) -> np.dtype[Any]:
     """Return the record of one world for declared motions and metrics; raise DeclarationError if a name is taken."""
-    fields: dict[str, Any] = {**dict(_WORLD), **{metric.sum_name: np.float64 for metric in metrics if metric.summed}}
-    for motion in motions:
+    sums: dict[str, Any] = {metric.sum_name: np.float64 for metric in declared.metrics if metric.summed}
+    fields = {**dict(_WORLD), **sums}
+    for motion in declared.motions:
         for memory in motion.memory:
             if memory.name in fields:
                 raise motion.error(f"a world has a field {memory.name!r}: choose another name for this memory")

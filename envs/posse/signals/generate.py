@@ -10,52 +10,15 @@ from __future__ import annotations
 import functools
 import linecache
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import posse.signals.metrics
 import posse.signals.own_fields
 import posse.signals.reward  # noqa: F401  (declare the built-in metrics, fields and terms)
-from posse.declarations import (
-    METRICS,
-    REWARD_TERMS,
-    SENSORS,
-    TARGET_MOTIONS,
-    FieldDeclaration,
-    Function,
-    Metric,
-    RewardTerm,
-    Sensor,
-    TargetMotion,
-    fields_of,
-    parameters_of,
-    place_of,
-)
+from posse.declarations import Declarations, FieldDeclaration, Function, Metric, parameters_of, place_of
 from posse.numeric import WIDTH
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.views import Generated
-
-
-class Declarations(NamedTuple):
-    """The declarations of a scenario, each kind in order of evaluation."""
-
-    fields: tuple[FieldDeclaration, ...]
-    """Observation fields, except sonar and messages."""
-    motions: tuple[TargetMotion, ...]
-    sensors: tuple[Sensor, ...]
-    metrics: tuple[Metric, ...]
-    reward_terms: tuple[RewardTerm, ...]
-
-
-def declarations_for(scenario: Scenario) -> Declarations:
-    """Return the declarations of a scenario: the built-in ones, and those that it names."""
-    TARGET_MOTIONS[scenario.target_motion].check(scenario)
-    return Declarations(
-        fields_of(scenario),
-        TARGET_MOTIONS.with_added(scenario.target_motion),
-        SENSORS.with_added(scenario.sensor),
-        METRICS.with_added(*scenario.metrics),
-        REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
-    )
 
 
 @functools.cache
@@ -75,7 +38,7 @@ def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> st
     It has one function each for the own observation fields, those of a team-mate, the rewards, the target's motion,
     the sensor and the sums of the metrics.
     """
-    return _Module(declarations_for(get_scenario(scenario, **overrides))).text
+    return _Module(Declarations.of(get_scenario(scenario, **overrides))).text
 
 
 _HEAD: Final = '''"""Functions that posse compiles for the declarations of a scenario."""
@@ -154,7 +117,7 @@ class _Module:
         for field in fields:
             mine = [f"{field.name}_{q}" for q in range(field.size)]
             yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
-            if "v" not in field.parameters:  # a constant
+            if "v" not in parameters_of(field.function):  # a constant
                 yield from (f"{column} = eight(float32({column}))" for column in mine)
             if field.of_mate:
                 yield from (f"{column} = choose(there, {column}, float32({field.unknown or 0}))" for column in mine)
@@ -182,7 +145,7 @@ class _Module:
         loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += float32(w.working)"]
         for metric in metrics:
             value = self._call(f"metric_{metric.name}", metric.function)
-            if "t" in metric.parameters:
+            if "t" in parameters_of(metric.function):
                 yield f"{metric.name}_total = ZERO"
                 loop.append(f"    {metric.name}_total += {value}")
                 value = f"{metric.name}_total"

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import FIELDS, TARGET_MOTIONS, Field, fields_of
+from posse.declarations import FIELDS, Declarations, Field
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario
@@ -44,7 +44,7 @@ class ObservationLayout:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        declared = [field.of(scenario) for field in fields_of(scenario)]
+        declared = [field.of(scenario) for field in Declarations.of(scenario).fields]
         own = [field for field in declared if not field.of_neighbour]
         if scenario.sonar_beams:
             own.append(Field("sonar", scenario.sonar_beams, "m", 0, scenario.sonar_range * SLACK, _SONAR))
@@ -180,7 +180,7 @@ class StateLayout:
 
 def _entries(s: Scenario) -> list[StateEntry]:
     """Return every entry, in order; control steps become times in s."""
-    memory = [each for motion in TARGET_MOTIONS.with_added(s.target_motion) for each in motion.memory]
+    memory = [each for motion in Declarations.of(s).motions for each in motion.memory]
     rows = [
         ("time", "s", "since the start", "world_step"),
         *((f"target_{k}", unit, f"the target's {k}", f"world_{k}") for k, unit in {**_POSE, **_FRAME}.items()),

@@ -12,11 +12,10 @@ import numba
 import numpy as np
 from numba.core import types
 
-from posse.declarations import Function, parameters_of, plain
+from posse.declarations import Declarations, Function, parameters_of, plain
 from posse.numeric import UNCOMPILED
 from posse.numeric.lanes import LanesType, tuple_of_lanes
 from posse.rules.state import CONFIG, OBSTACLE, SCRATCH, SLOT, TRACKER, world_record_of
-from posse.signals.generate import Declarations
 from posse.signals.views import Mate, View
 
 _njit: Final[Any] = numba.njit  # Any: its types lack _nrt
@@ -34,8 +33,7 @@ def check_functions(declarations: Declarations) -> None:
     added = [each for group in declarations for each in group if not each.built_in]
     if UNCOMPILED or not added:
         return
-    world = world_record_of(declarations.motions, declarations.metrics)
-    records = {"c": CONFIG, "w": world, "t": TRACKER, "s": SCRATCH}
+    records = {"c": CONFIG, "w": world_record_of(declarations), "t": TRACKER, "s": SCRATCH}
     arrays = {"trackers": TRACKER, "obstacles": OBSTACLE, "slots": SLOT}
     known: dict[str, Any] = {
         **{name: _typeof(np.zeros(1, dtype)[0]) for name, dtype in records.items()},

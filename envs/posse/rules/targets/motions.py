@@ -11,7 +11,6 @@ from posse.declarations import Memory, target_motion
 from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
-from posse.scenarios.scenario import SLACK
 
 _LEAST_RATE: Final = 0.2  # rad/s
 _MOST_RATE: Final = 0.8
@@ -24,9 +23,9 @@ _AMPLITUDE_WALK: Final = 0.05
 _RATE_WALK: Final = 0.03
 
 _MEMORY: Final = (
-    Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * SLACK, "of an accelerating target"),
-    Memory("weave_rate", "rad/s", 0, 1, "of an accelerating target"),
-    Memory("weave_phase", "rad", 0, 2 * math.pi * SLACK, "of an accelerating target"),
+    Memory("weave_amplitude", "rad/s", "of an accelerating target"),
+    Memory("weave_rate", "rad/s", "of an accelerating target"),
+    Memory("weave_phase", "rad", "of an accelerating target"),
 )
 
 

@@ -16,7 +16,6 @@ from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compile
 from posse.numeric.lanes import choose, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
-from posse.scenarios.scenario import SLACK
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
@@ -48,13 +47,7 @@ _SIDES: Final = (ONE, -ONE)
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
 _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
-_PRESSED: Final = Memory(
-    "pressed",
-    "s",
-    lambda s: -float(DART_TURN) / s.target_turn_rate * SLACK,
-    float(PATIENCE),
-    "of a smart target: time that the team has kept station; < 0: dart",
-)
+_PRESSED: Final = Memory("pressed", "s", "of a smart target: time that the team has kept station; < 0: dart")
 
 
 @target_motion("smart", memory=(_PRESSED,), mirrored=False)
