@@ -83,9 +83,6 @@ class Declaration:
         signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
             All but ``function`` may be ``None``.
         choices: The values that other attributes may have.
-
-    Raises:
-        DeclarationError: A function has no docstring or other parameters, or another attribute is invalid.
     """
 
     name: str
@@ -163,10 +160,6 @@ class Registry(dict[str, D]):
 
         Args:
             **options: Attributes of the declaration; its name is by default that of the function.
-
-        Raises:
-            DeclarationError: The function is the first argument, or, when one is declared, the declaration is invalid
-                or its name taken.
         """
         first = next(iter(options.values()))
         if callable(first):

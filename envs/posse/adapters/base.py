@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, check_count, mask_of, options_of
-from posse.engine.batch import Batch
+from posse.engine.batch import Batch, of_batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
@@ -32,15 +32,11 @@ class BatchEnv:
     Args:
         parts: For each batch its scenario, or the name, and its worlds.
         discrete_actions: Whether actions are numbers of :data:`posse.adapters.actions.MOTIONS`.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
         seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the environment's first world within the seed.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
-        autoreset: As for :class:`posse.Batch`.
-        num_threads: As for :class:`posse.Batch`.
-        overrides: Any field of :class:`posse.Scenario`.
+        settings: Further arguments of :class:`posse.Batch`, or any field of :class:`posse.Scenario`.
 
     Attributes:
         batches: The worlds.
@@ -48,11 +44,6 @@ class BatchEnv:
         scenario: Its scenario.
         layout: Position of each field in an observation.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
-
-    Raises:
-        ScenarioError: An unknown scenario, split or mode, an unknown or invalid setting, or batches whose observations
-            have different lengths.
-        TypeError: ``target_policy`` is not the policy of a target.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
@@ -66,31 +57,18 @@ class BatchEnv:
         parts: Iterable[tuple[str | Scenario, range]],
         *,
         discrete_actions: bool = False,
-        clip_actions: bool = False,
         render_mode: str | None = None,
         seed: int | None = None,
-        split: str = "train",
         first_world: int = 0,
         target_policy: TargetPolicy | None = None,
-        autoreset: str,
-        num_threads: int | None,
-        **overrides: Any,
+        **settings: Any,
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        first_world = check_count("first_world", first_world, 0)
+        first_world, own = check_count("first_world", first_world, 0), of_batch(settings)
+        own |= {"seed": 0 if seed is None else seed, "target_policy": target_policy}
         self.batches = [
-            self._make(
-                self._fit(scenario, **overrides),
-                len(worlds),
-                target_policy=target_policy,
-                seed=0 if seed is None else seed,
-                split=split,
-                first_world=first_world + worlds.start,
-                autoreset=autoreset,
-                num_threads=num_threads,
-                clip_actions=clip_actions,
-            )
+            self._make(self._fit(scenario, **settings), len(worlds), first_world=first_world + worlds.start, **own)
             for scenario, worlds in parts
         ]
         shapes = {batch.observation_shape[1:] for batch in self.batches}

@@ -43,35 +43,22 @@ def solo_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
 class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     """``posse/Team-v0``: one agent controls the whole team.
 
+    State, start and end are those of :class:`posse.adapters.pettingzoo_env.TeamParallelEnv`.
+
     **Observation**: ``Box`` (N, F) float32, the observation of each tracker; its fields are
     ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
 
-    **Action**: ``Box(-1, 1, (N, 2 + message_size))`` float32: for each tracker its speed (-1 is at
-    rest, 1 the maximum), turn rate (1 is the maximum to the left) and message. With
-    ``discrete_actions=True`` ``MultiDiscrete([15] * N)``, rows of
-    :data:`posse.adapters.actions.MOTIONS`.
+    **Action**: ``Box(-1, 1, (N, 2 + message_size))`` float32, the action of each tracker there. With
+    ``discrete_actions=True`` ``MultiDiscrete([15] * N)``.
 
     **Reward**: the mean over the trackers of the weighted sum of named terms.
 
-    **Info**, with the same keys at every reset and step: ``"score"`` in [0, 1];
-    ``"reward/<term>"``, each term, unscaled, (N,); ``"metrics/<metric>"``, each metric of the
-    episode (``posse.METRICS``), 0 before the step that ends it; ``"working"`` (N,), if trackers
-    may break.
-
-    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
-    world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
-    ``options={"tracker_pose": (N, 3), "target_pose": (3,)}`` starts from these (x, y, θ).
-
-    **End**: truncation after ``horizon`` steps; termination only with ``terminate_on_contact``.
+    **Info**: as there, with ``"reward/<term>"`` and ``"working"`` (N,).
 
     Args:
         scenario: Name of a scenario, or a scenario.
         settings: Further arguments of :class:`posse.adapters.base.BatchEnv`, or any field of
             :class:`posse.Scenario`.
-
-    Raises:
-        ScenarioError: An unknown scenario, or an unknown or invalid setting.
-        TypeError: ``target_policy`` is not the policy of a target.
     """
 
     _fit = staticmethod(team_scenario)
@@ -91,12 +78,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         return observation, self._info()
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
-        """Advance the world by one control step.
-
-        Raises:
-            ResetNeeded: Before the first reset, or after the end.
-            ValueError: An action out of its space; nothing is changed.
-        """
+        """Advance the world by one control step; errors are those of :meth:`posse.Batch.step`."""
         batch, own = self.batch, self._own
         batch.check_running()
         motions = as_motions("action", action, self._shape, self._discrete)

@@ -53,9 +53,6 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         scenario: Name of a scenario, or a scenario.
         settings: ``target_motion="agent"`` makes the target an agent; further arguments of
             :class:`posse.adapters.base.BatchEnv`, or any field of :class:`posse.Scenario`.
-
-    Raises:
-        ScenarioError: An unknown scenario, split or render mode, or an unknown or invalid setting.
     """
 
     metadata: ClassVar[dict[str, Any]] = {**WorldEnv.metadata, "name": "posse_track_v0", "is_parallelizable": True}

@@ -36,18 +36,13 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     Args:
         scenario: Name of a scenario, or a scenario; or a family or its name: each of :data:`DRAWN` drawn scenarios has
-            a share of the worlds, and the spaces hold the observations of all.
+            a share of the worlds, and the spaces hold the observations of all, which must have one length.
         num_envs: E, at least 1.
         autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``: the
             next step starts a new one and ignores its action; ``"same_step"``: a new one starts at
             once, the last observation is ``info["final_obs"]``, the last info ``info["final_info"]``;
             ``"disabled"``: the caller resets, with ``options={"reset_mask": mask}``.
-        num_threads: Threads that step the worlds; never changes a result.
         settings: As for :class:`TeamEnv`.
-
-    Raises:
-        ScenarioError: As for :class:`posse.adapters.gymnasium_env.TeamEnv`; an unknown mode of autoreset; or
-            observations of different lengths, as of a family's teams of different sizes.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -62,13 +57,12 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         num_envs: int = 1,
         *,
         autoreset: str = "next_step",
-        num_threads: int | None = None,
         **settings: Any,
     ) -> None:
         self.num_envs = check_count("num_envs", num_envs, 1)
         seed, split = settings.get("seed") or 0, settings.get("split", "train")
         parts = shares(scenario_or_family(scenario), self.num_envs, min(DRAWN, self.num_envs), seed, split)
-        super().__init__(parts, autoreset=autoreset, num_threads=num_threads, **settings)
+        super().__init__(parts, autoreset=autoreset, **settings)
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space, self.single_action_space = self._spaces()
@@ -86,12 +80,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
-        """Advance every world by one control step.
-
-        Raises:
-            ResetNeeded: Before the first reset, or after an end with autoreset ``"disabled"``.
-            ValueError: Actions out of their space; nothing is changed.
-        """
+        """Advance every world by one control step; errors are those of :meth:`posse.Batch.step`."""
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
         motions = motions.reshape(self.num_envs, *self.batch.action_shape[1:])
         if len(self.batches) > 1:  # all is checked before any world advances

@@ -80,9 +80,6 @@ class Batch(OwnArrays):
         term_names: Names of the reward terms, in the order in which they are reported.
         observation_shape: (E, rows, F); rows = N, plus one if the target is an agent.
         action_shape: (E, rows, 2 + message_size).
-
-    Raises:
-        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode.
     """
 
     def __init__(
@@ -186,21 +183,12 @@ class Batch(OwnArrays):
         return {each.name: each.of(self.scenario, self.arrays.world) for each in self._declared.metrics}
 
     def save(self) -> Snapshot:
-        """Return the current state of the worlds, for :meth:`restore`.
-
-        Raises:
-            ResetNeeded: Before the first :meth:`reset`.
-        """
+        """Return the current state of the worlds, for :meth:`restore`; ResetNeeded before the first :meth:`reset`."""
         self.check_started("save")
         return Snapshot(self.scenario, self.arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
-        """Restore a snapshot and return its observations.
-
-        Raises:
-            ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
-                changed.
-        """
+        """Restore a snapshot of this scenario and number of worlds, or raise ValueError; return its observations."""
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
@@ -209,11 +197,7 @@ class Batch(OwnArrays):
         return self.observe()
 
     def observe(self) -> FloatArray:
-        """Return the current observations of the worlds, (E, rows, F).
-
-        Raises:
-            ResetNeeded: Before the first :meth:`reset`.
-        """
+        """Return the current observations of the worlds, (E, rows, F); ResetNeeded before the first :meth:`reset`."""
         self.check_started("observe")
         return self._execute(np.zeros(self.num_worlds, np.bool_), LOOK)
 
@@ -231,11 +215,6 @@ class Batch(OwnArrays):
             alike: Whether all copies of a world have equal draws, for comparing actions.
             into: A batch of this scenario with ``num_worlds * count`` worlds to overwrite and
                 return, which takes much less time than creating one.
-
-        Raises:
-            ResetNeeded: Before the first :meth:`reset`.
-            ScenarioError: ``count`` below 1, or a negative seed.
-            ValueError: ``into`` is this batch, or one of another scenario or number of worlds.
         """
         count, seed = check_count("count", count, 1), check_count("seed", seed, 0)
         self.check_started("copies")
@@ -443,3 +422,8 @@ class Batch(OwnArrays):
                 f"step after the end of the episode of world {over[0]}{more}: call reset() first, "
                 'or reset(options={"reset_mask": mask}) for these worlds alone'
             )
+
+
+def of_batch(settings: dict[str, Any]) -> dict[str, Any]:
+    """Take the arguments of :class:`Batch` out of settings, and return them; the others are fields of its scenario."""
+    return {name: settings.pop(name) for name in Batch.__init__.__kwdefaults__ or () if name in settings}

@@ -204,9 +204,6 @@ def kernel_of(declarations: Declarations) -> Callable[..., int]:
     As thread ``thread`` it executes the orders of worlds ``first`` to ``end`` (:func:`advance_worlds`), and returns the
     number of those whose episodes are over. It is compiled again when a value that a user's function reaches has
     changed.
-
-    Raises:
-        DeclarationError: A user's function cannot be compiled.
     """
     check_functions(declarations)
     return _kernel_of(declarations, stamp(*filter(callable, generated_for(declarations))))

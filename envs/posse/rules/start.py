@@ -160,11 +160,7 @@ def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw
 
 
 def check_drawn(s: Scenario, world: Records, started: BoolArray, given: Container[str] = ()) -> None:
-    """Raise if the start of any ``started`` world could not be drawn, but for poses that are given.
-
-    Raises:
-        ScenarioError: Names the settings that are too tight.
-    """
+    """Raise ScenarioError if the start of any ``started`` world could not be drawn, but for poses that are given."""
     undrawn = int(np.bitwise_or.reduce(world["undrawn"][started]))
     if undrawn == 0:
         return

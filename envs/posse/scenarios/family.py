@@ -84,11 +84,7 @@ class Family:
         return self.base.message_size
 
     def draw(self, index: int, seed: int = 0, split: str = "train") -> Scenario:
-        """Return a scenario of the family; it depends on nothing but index, seed and split.
-
-        Raises:
-            ScenarioError: An index or a seed that is no whole number from 0 on.
-        """
+        """Return a scenario of the family; it depends on nothing but index, seed and split."""
         whole: dict[str, Any] = {"index": index, "seed": seed}
         for name, value in whole.items():
             if not isinstance(value, int | np.integer) or value < 0:
@@ -101,11 +97,7 @@ class Family:
         return self.base.replace(**values)
 
     def replace(self, **changes: Any) -> Family:
-        """Return a family with settings changed: each gets a range or one value, as in :func:`posse.family`.
-
-        Raises:
-            ScenarioError: An unknown or invalid setting.
-        """
+        """Return a family with settings changed: each gets a range or one value, as in :func:`posse.family`."""
         return family(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,11 +175,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def scenario_or_family(given: str | Scenario | Family, **overrides: Any) -> Scenario | Family:
-    """Return a scenario or a family, given it or its name, with settings changed.
-
-    Raises:
-        ScenarioError: An unknown name, or an unknown or invalid setting.
-    """
+    """Return a scenario or a family, given it or its name, with settings changed."""
     if isinstance(given, Family) or (isinstance(given, str) and given in FAMILIES):
         return family(given, **overrides)
     if isinstance(given, str) and given not in SCENARIOS:

@@ -150,7 +150,7 @@ def scenario_names() -> tuple[str, ...]:
 
 
 def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
-    """Return a scenario by name, or the given one, with fields overridden.
+    """Return a scenario by name, or the given one, with fields overridden; ScenarioError for an unknown name or field.
 
     A ``horizon`` that is given without ``settle_time``, and makes the episode shorter than that of
     the scenario, shortens it to the episode.
@@ -158,10 +158,6 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     Args:
         scenario: Its name, or a scenario.
         overrides: Any field of :class:`posse.Scenario`.
-
-    Raises:
-        ScenarioError: An unknown name (the message suggests similar ones), an unknown or invalid
-            setting.
     """
     if isinstance(scenario, Scenario):
         found = scenario

@@ -62,10 +62,8 @@ class Scenario:
 
     Lengths are in metres, times in seconds, speeds in m/s, angles in radians, turn rates in rad/s.
     Every field can be overridden by keyword: ``posse.parallel_env("smart", num_trackers=8)``.
-    :meth:`settings` lists the fields with unit, range and meaning.
-
-    Raises:
-        ScenarioError: An invalid field or combination of fields.
+    :meth:`settings` lists the fields with unit, range and meaning. An invalid field, or one that does not fit the
+    others, is a :class:`ScenarioError`.
     """
 
     name: str = setting(dataclasses.MISSING, "name in results and policy cards")
@@ -389,11 +387,7 @@ class Scenario:
         return min(0.8 * (slowest - self.target_speed), self.target_speed) / rho
 
     def replace(self, **overrides: Any) -> Scenario:
-        """Return a copy with some fields changed.
-
-        Raises:
-            ScenarioError: An unknown field (the message suggests similar ones) or an invalid value.
-        """
+        """Return a copy with some fields changed; an unknown one is a ScenarioError that suggests similar ones."""
         for key in overrides:
             if key not in self.settings():
                 # Libraries that try a keyword of their own look for the words of Python's TypeError.

@@ -69,11 +69,7 @@ class Setting:
         return interval + infinite + none + each + sides
 
     def accept(self, name: str, value: object) -> Any:
-        """Return a value as the scenario keeps it: Python's numbers for numpy's, tuples for lists.
-
-        Raises:
-            ScenarioError: A wrong type, or out of range; names the setting and its range.
-        """
+        """Return a value as the scenario keeps it, Python's numbers for numpy's, tuples for lists; or ScenarioError."""
         if isinstance(value, np.ndarray):
             value = value.tolist()
         several = value if isinstance(value, (tuple, list)) else None
