@@ -2,7 +2,7 @@
 
 :func:`compiled` and :func:`out_of_line` are for functions of one robot or one world, :func:`kernel` for the few that
 Python calls. There is no fast-math, since a result must not depend on a world's place in its batch. With
-``NUMBA_DISABLE_JIT=1`` they return the plain function, for debugging. Three of numba's inner parts are overridden; the
+``NUMBA_DISABLE_JIT=1`` they return the plain function, for debugging. Two of numba's inner parts are overridden; the
 classes at the end say what each gains, and ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
 """
 
@@ -15,7 +15,7 @@ import io
 import os
 import pickle
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Final, TypeVar, cast
@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from llvmlite import __version__ as llvmlite_version
 from llvmlite import binding
-from numba.core import caching, codegen, compiler, extending, imputils, serialize, types
+from numba.core import caching, codegen, compiler, serialize, types
 from numba.core.registry import CPUDispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -67,7 +67,8 @@ def kernel(function: F) -> F:
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).digest()
-_BUILD: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__, _CONFIG.OPT, _CONFIG.BOUNDSCHECK)
+_VERSIONS: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__)
+_BUILD: Final = (_SOURCES, _VERSIONS, _CONFIG.OPT, _CONFIG.BOUNDSCHECK)
 _PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
@@ -80,7 +81,7 @@ def stamp(*values: Any) -> str:
     globals and attributes of modules that they name, recursively.
     """
     _known.clear()
-    return _digest((_BUILD, _SOURCES, values)).hex()
+    return _digest((_BUILD, values)).hex()
 
 
 def _digest(value: Any) -> bytes:
@@ -105,13 +106,11 @@ class _Reached(pickle.Pickler):
             return bytes, (_known[function],)
         if isinstance(value, CodeType):  # without places in its file
             return tuple, ((value.co_code, value.co_consts, value.co_names, value.co_varnames, value.co_freevars),)
-        if isinstance(value, ModuleType):
-            return str, (value.__name__,)
         if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
             return tuple, ((str(value), getattr(value, "instance_class", None), getattr(value, "types", ())),)
-        if isinstance(value, type) and value.__module__ != "builtins":
+        if isinstance(value, (ModuleType, type)) and value is not tuple:
             inside = getattr(value, "_fields", ()), repr(getattr(value, "__members__", ""))
-            return tuple, ((value.__qualname__, *inside),)
+            return tuple, ((value.__name__, *inside),)
         try:
             pickle.dumps(value)
         except Exception:  # pickle may raise anything; such a value makes a kernel for this process alone
@@ -120,20 +119,19 @@ class _Reached(pickle.Pickler):
 
 
 def _parts_of(function: FunctionType) -> tuple[Any, ...]:
-    """Return what a function says, and what it reaches."""
+    """Return what a function says, and the values of the names in its code, in its scope and in modules found there."""
     code, cells = function.__code__, function.__closure__ or ()
     scope = dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
     if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
         scope = {**function.__globals__, **scope}
-    return function.__name__, code, function.__defaults__, function.__kwdefaults__, _found(scope, _names_in(code))
-
-
-def _found(scope: Mapping[str, Any], names: frozenset[str]) -> list[Any]:
-    """Return the values of names in a scope, and in modules within it."""
-    values = [(name, scope[name]) for name in sorted(names) if name in scope]
-    modules = [(name, value) for name, value in values if isinstance(value, ModuleType)]
-    own = [each for each in modules if each[1].__name__.partition(".")[0] not in ("numba", "numpy")]
-    return [*values, *(_found(vars(module), names - {name}) for name, module in own)]
+    found: list[Any] = []
+    places: list[Any] = [SimpleNamespace(**scope)]
+    for place in places:  # modules are added as they are found
+        values = [(name, vars(place)[name]) for name in sorted(_names_in(code) & vars(place).keys())]
+        modules = (value for _, value in values if isinstance(value, ModuleType) and value not in places)
+        places += (each for each in modules if each.__name__.partition(".")[0] not in ("numba", "numpy"))
+        found += values
+    return function.__name__, code, function.__defaults__, function.__kwdefaults__, found
 
 
 @functools.cache
@@ -150,7 +148,7 @@ class _Cache(caching.NullCache):
 
     def _path(self, sig: Any, target: Any) -> Path:
         user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-        folder = Path(os.environ.get("POSSE_CACHE_DIR") or Path(user).expanduser() / "posse").absolute()
+        folder = Path(os.environ.get("POSSE_CACHE_DIR") or f"{user}/posse").expanduser().absolute()
         f = self._function
         return folder / f"{f.__name__}-{stamp(f, tuple(sig), f.__module__, f.__qualname__, target)}.kernel"
 
@@ -180,16 +178,7 @@ def _announce() -> None:
 
 
 class _Library(codegen.JITCodeLibrary):
-    """LLVM code of a kernel, in which only what is marked is inlined, and no loop is unrolled or vectorised.
-
-    Most loops run a few times: this makes kernels 10 % faster, and saves 1.5 s of compiling.
-    """
-
-    def add_ir_module(self, ir_module: Any) -> None:
-        for function in ir_module.functions:
-            if function.blocks and "alwaysinline" not in function.attributes:
-                function.attributes.add("noinline")
-        super().add_ir_module(ir_module)
+    """LLVM code of a kernel, in which no loop is unrolled or vectorised: most run a few times. Kernels gain 20 %."""
 
     def _optimize_final_module(self) -> None:
         options = binding.create_pipeline_tuning_options(_CONFIG.OPT)
@@ -198,7 +187,7 @@ class _Library(codegen.JITCodeLibrary):
         builder.getModulePassManager().run(self._final_module, builder)
 
 
-class _InnerLibrary(_Library):
+class _InnerLibrary(codegen.JITCodeLibrary):
     """LLVM code of a function, which is optimised and made machine code only where it is linked; saves 12 s."""
 
     codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)  # numba's requires machine code
@@ -224,28 +213,14 @@ class _Compiler(compiler.CompilerBase):
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class _FunctionType(types.Dispatcher):
-    """Type of a function without a value at run time: numba's own holds an address, which cannot be cached."""
-
-    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        return super().get_call_type(context, tuple(map(types.unliteral, args)), kws)  # not once for each constant
-
-
-extending.register_model(_FunctionType)(extending.models.OpaqueModel)
-imputils.lower_constant(_FunctionType)(lambda context, builder, kind, function: context.get_dummy_value())
-
-
 class _Function(CPUDispatcher):
     """A function that Python can call, with a form to link into kernels for each state of what it reaches."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, {}, _OPTIONS)
-        self.inner_options = {**_OPTIONS, **options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self.inner: dict[bytes, CPUDispatcher] = {}
+        options = {**_OPTIONS, **options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self.inner = functools.cache(lambda state: CPUDispatcher(function, {}, options, _Compiler))
 
     @property
-    def _numba_type_(self) -> _FunctionType:
-        state = _digest(self)
-        if state not in self.inner:
-            self.inner[state] = CPUDispatcher(self.py_func, {}, self.inner_options, _Compiler)
-        return _FunctionType(self.inner[state])
+    def _numba_type_(self) -> types.Dispatcher:
+        return types.Dispatcher(self.inner(_digest(self)))

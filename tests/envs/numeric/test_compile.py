@@ -18,16 +18,15 @@ pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
 
 PARTS = """
 numba.core.caching NullCache.load_overload NullCache.save_overload
-numba.core.codegen JITCodeLibrary.add_ir_module JITCodeLibrary.enable_object_caching JITCodeLibrary.has_dynamic_globals
+numba.core.codegen JITCodeLibrary.enable_object_caching JITCodeLibrary.has_dynamic_globals JITCPUCodegen.set_env
 numba.core.codegen JITCodeLibrary._optimize_functions JITCodeLibrary._optimize_final_module JITCPUCodegen.magic_tuple
-numba.core.codegen JITCodeLibrary._finalize_final_module JITCPUCodegen.set_env
+numba.core.codegen JITCodeLibrary._finalize_final_module
 numba.core.compiler CompilerBase.define_pipelines DefaultPassBuilder.define_nopython_pipeline Flags.forceinline
 numba.core.compiler CompileResult._reduce CompileResult._rebuild Flags.no_cpython_wrapper
-numba.core.extending models.OpaqueModel models.PrimitiveModel register_model
-numba.core.imputils lower_builtin lower_cast lower_constant
+numba.core.extending models.PrimitiveModel register_model
+numba.core.imputils lower_builtin lower_cast
 numba.core.registry CPUDispatcher.recompile CPUDispatcher._numba_type_
 numba.core.serialize dumps
-numba.core.types Dispatcher.get_call_type unliteral
 numba.core.typing.templates AbstractTemplate ConcreteTemplate infer_global signature
 llvmlite.binding create_pass_builder create_pipeline_tuning_options
 """
