@@ -187,8 +187,11 @@ class PosseEnv(EnvBase):
         for group, part in self._rows.items():
             size = (*self.batch_size, len(self.group_map[group]))
             packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
-        for name in ("score", "terminated", "truncated"):  # TorchRL adds "done"
-            packed.set(name, self._tensor(getattr(self.batch, name)).unsqueeze(-1))
+        worlds = self.batch.worlds
+        ended, terminated = worlds["over"] != 0, worlds["terminated"] != 0
+        ends = {"terminated": terminated, "truncated": ended & ~terminated}  # TorchRL adds "done"
+        for name, values in {"score": worlds["score"].copy(), **ends}.items():
+            packed.set(name, self._tensor(values).unsqueeze(-1))
         if self._state_layout is not None:
             packed.set("state", self._tensor(self._state_layout.vector(self.batch.arrays)))
         return packed

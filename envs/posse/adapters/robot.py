@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import SENSORS
-from posse.engine.arguments import real_numbers
+from posse.engine.arguments import MOST_ACTION, real_numbers
 from posse.engine.batch import Batch
-from posse.engine.kernels import MOST_ACTION
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix

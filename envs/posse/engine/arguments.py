@@ -9,12 +9,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.kernels import MOST_ACTION, all_in_box
-from posse.numeric import BoolArray, FloatArray
+from posse.declarations import unknown
+from posse.numeric import ONE, BoolArray, FloatArray, kernel
 from posse.scenarios import Scenario, ScenarioError
 
 MOST: Final = 2**63
 """Seeds and numbers of worlds are below."""
+MOST_ACTION: Final = np.float32(1 + 1e-6)
+"""Actions up to this are clipped to 1, since rounding may exceed it."""
 _FLOAT32: Final = np.dtype(np.float32)
 
 
@@ -28,7 +30,7 @@ def check_count(name: str, value: object, least: int) -> int:
 def check_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
     """Return one of the choices, or raise ScenarioError."""
     if not isinstance(value, str) or value not in choices:
-        raise ScenarioError(f"unknown {name} {reprlib.repr(value)}; known: {', '.join(choices)}")
+        raise ScenarioError(unknown(name, value, choices))
     return value
 
 
@@ -73,6 +75,15 @@ def as_float32(name: str, value: object, shape: tuple[int, ...] | None = None) -
     array = real_numbers(name, value, shape)
     with np.errstate(over="ignore"):
         return np.ascontiguousarray(array, np.float32)
+
+
+@kernel
+def all_in_box(actions: FloatArray) -> bool:
+    """Return whether all actions are in [-1, 1]."""
+    flat, inside = actions.reshape(-1), True
+    for k in range(len(flat)):
+        inside &= flat[k] >= -ONE and flat[k] <= ONE
+    return inside
 
 
 def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions[{}, {}, {}]".format) -> FloatArray:

@@ -159,21 +159,6 @@ class Batch(OwnArrays):
         return self.arrays.world
 
     @property
-    def score(self) -> FloatArray:
-        """(E,) the score of the current step; 0 at the start."""
-        return np.array(self.arrays.world["score"])
-
-    @property
-    def terminated(self) -> BoolArray:
-        """(E,) whether the last step or reset left the world's episode terminated."""
-        return np.asarray(self.arrays.world["terminated"] != 0)
-
-    @property
-    def truncated(self) -> BoolArray:
-        """(E,) whether the last step or reset left the world's episode truncated."""
-        return np.asarray(self.arrays.world["over"] != 0) & ~self.terminated
-
-    @property
     def working(self) -> BoolArray:
         """(E, N) whether each tracker works."""
         return np.asarray(self.arrays.tracker["broken_at"] == NEVER)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import Declarations, RewardTerm
-from posse.numeric import ONE, UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
+from posse.numeric import UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.numeric.compile import stamp
 from posse.numeric.lanes import fetch
 from posse.rules.contact import meet
@@ -268,16 +268,3 @@ def first_bad_start(config: Records, world: Records, tracker: Records, obstacle:
         if chosen[e] and c.target_speed > 0 and not target_can_turn(c, w, obstacles):
             return int(e * (n + 2) + n + 1)
     return -1
-
-
-MOST_ACTION: Final = np.float32(1 + 1e-6)
-"""Actions up to this are clipped to 1, since rounding may exceed it."""
-
-
-@kernel
-def all_in_box(actions: FloatArray) -> bool:
-    """Return whether all actions are in [-1, 1]."""
-    flat, inside = actions.reshape(-1), True
-    for k in range(len(flat)):
-        inside &= flat[k] >= -ONE and flat[k] <= ONE
-    return inside

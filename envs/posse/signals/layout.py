@@ -107,8 +107,6 @@ _Values = npt.NDArray[Any]
 _POSE: Final = {"x": "m", "y": "m", "heading_cos": "1", "heading_sin": "1", "speed": "m/s", "turn_rate": "rad/s"}
 _FIX: Final = {"fix_x": "m", "fix_y": "m", "fix_cos": "1", "fix_sin": "1", "fix_frame_cos": "1", "fix_frame_sin": "1"}
 _FRAME: Final = {"frame_cos": "1", "frame_sin": "1", "goal_cos": "1", "goal_sin": "1"}
-
-
 _ODOMETRY: Final = {"x": "m", "y": "m", "heading": "rad"}
 
 

@@ -37,11 +37,6 @@ def test_contact_terminates_where_it_is_asked_for() -> None:
 
 def test_pettingzoo_can_draw() -> None:
     render_test(posse.env)
-    env = posse.parallel_env(render_mode="human")
-    env.reset(seed=0)
-    assert env.render() is None
-    env.close()
-    env.close()
 
 
 def test_a_discrete_action_is_one_of_the_motions() -> None:

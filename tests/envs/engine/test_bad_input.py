@@ -21,7 +21,7 @@ WHOLE = r"must be a whole number in"
 OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
     ({"scenario": "smrt"}, r"unknown scenario 'smrt' \(did you mean .*'smart'"),
     ({"num_tracker": 1}, r"unknown setting 'num_tracker'.*did you mean 'num_trackers'"),
-    ({"split": "tests"}, r"unknown split 'tests'; known: train"),
+    ({"split": "tests"}, r"unknown split .tests.*known: train"),
     ({"split": np.zeros(2)}, r"unknown split array"),
     ({"seed": -1}, rf"seed=-1 {WHOLE} \[0, "),
     ({"first_world": -1}, rf"first_world=-1 {WHOLE}"),
@@ -37,13 +37,10 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("batch", {"first_world": 2**63 - 1, "num_worlds": 2}, rf"first_world \+ num_worlds - 1=.* {WHOLE}"),
         ("batch", {"num_threads": 0}, rf"num_threads=0 {WHOLE} \[1, "),
         ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
-        ("parallel", {"target": "smart"}, r"unexpected keyword argument 'target'"),
-        ("parallel", {"horizon": 0}, r"horizon=0"),
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
         ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
         ("team", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env.*target_policy="),
-        ("solo vector", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
         ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
         *(
             ("solo vector", {"scenario": each}, r"breaks=1 of the trackers .* Pass breaks=0, or use posse/Team-v0")
@@ -80,13 +77,10 @@ BAD_ACTIONS: list[tuple[bool, Any, str]] = [
     (False, f32([np.inf, 0]), r"tracker_3: speed = inf"),
     (False, [0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
     (False, f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
-    (False, f32([[0, 0]]), r"tracker_3 has shape \(1, 2\), wanted \(2,\)"),
     (False, ["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
-    (False, None, r"tracker_3 must be real numbers, got None"),
     (False, [[0], [0, 1]], r"tracker_3 is not an array"),
     (True, 15, r"tracker_3 is 15, outside 0 to 14"),
     (True, 1.0, r"tracker_3 must be whole numbers, got 1\.0"),
-    (True, [3], r"tracker_3 has shape \(1,\), wanted \(\)"),
 ]
 
 

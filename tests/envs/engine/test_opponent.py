@@ -1,7 +1,6 @@
 """A batch in which a policy moves the target."""
 
 from copy import deepcopy
-from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -81,23 +80,6 @@ def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
     for step in range(1, 5):
         np.testing.assert_array_equal(copy.step(actions_for(copy, step))[0], batch.step(actions_for(batch, step))[0])
     np.testing.assert_array_equal(batch.restore(batch.save()), batch.observe())
-
-
-@pytest.mark.parametrize("vector", [False, True])
-def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
-    batch = posse.batch(SHORT, 1, seed=5, target_policy=Weaver())
-    expected = batch.reset()
-    make: Any = partial(gym.make_vec, vectorization_mode="vector_entry_point") if vector else gym.make
-    env = make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
-    assert env.action_space.shape[-2:] == (2, 2)
-    observation, _ = env.reset(seed=5)
-    for step in range(HORIZON):
-        np.testing.assert_array_equal(np.reshape(observation, expected.shape), expected)
-        action = actions_for(batch, step)
-        expected, rewards, *_ = batch.step(action)
-        observation, reward, *_ = env.step(action if vector else action[0])
-        assert np.asarray(reward).item() == pytest.approx(rewards.mean())
-    env.close()
 
 
 class Wrong(Weaver):
