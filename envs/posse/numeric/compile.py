@@ -121,23 +121,21 @@ class _Reached(pickle.Pickler):
 def _parts_of(function: FunctionType) -> tuple[Any, ...]:
     """Return what a function says, and the values of the names in its code, in its scope and in modules found there."""
     code, cells = function.__code__, function.__closure__ or ()
+    codes = [code]
+    for each in codes:  # those within are added as they are found
+        codes += (inner for inner in each.co_consts if isinstance(inner, CodeType))
+    names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
     scope = dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
     if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
         scope = {**function.__globals__, **scope}
     found: list[Any] = []
     places: list[Any] = [SimpleNamespace(**scope)]
-    for place in places:  # modules are added as they are found
-        values = [(name, vars(place)[name]) for name in sorted(_names_in(code) & vars(place).keys())]
+    for place in places:  # so are modules
+        values = [(name, vars(place)[name]) for name in sorted(names & vars(place).keys())]
         modules = (value for _, value in values if isinstance(value, ModuleType) and value not in places)
         places += (each for each in modules if each.__name__.partition(".")[0] not in ("numba", "numpy"))
         found += values
     return function.__name__, code, function.__defaults__, function.__kwdefaults__, found
-
-
-@functools.cache
-def _names_in(code: CodeType) -> frozenset[str]:
-    within = (each for each in code.co_consts if isinstance(each, CodeType))
-    return frozenset((*code.co_names, *code.co_freevars)).union(*map(_names_in, within))
 
 
 class _Cache(caching.NullCache):

@@ -28,14 +28,13 @@ def share_fixes(c: Record, trackers: Records) -> None:
     """Perfect radio without faults: every tracker takes the newest fix."""
     if c.fix_bearing != 0:
         return
-    best = 0
-    for i in range(1, c.num_trackers):
-        if trackers[i].fix_step > trackers[best].fix_step:
-            best = i
-    b = trackers[best]
+    best = trackers[0]
     for t in trackers:
-        if t.fix_step < b.fix_step:
-            take_fix(c, t, b)
+        if t.fix_step > best.fix_step:
+            best = t
+    for t in trackers:
+        if t.fix_step < best.fix_step:
+            take_fix(c, t, best)
 
 
 @compiled
