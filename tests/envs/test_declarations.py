@@ -143,17 +143,6 @@ def test_the_generated_source_can_be_read() -> None:
 
 
 EXAMPLES = examples("extend.md")
-TWICE = """
-import posse
-from posse.numeric import choose
-
-
-@posse.field("1", low=-1, high=lambda s: s.num_trackers, unknown=-1, size=2)
-def twice(c, v):
-    \"\"\"Whether it moves, and the team's size.\"\"\"
-    return choose(v.speed > 0.0, 1.0, -1.0), c.num_trackers
-
-"""
 FIELDS_AND_TERMS = """
 import pickle
 
@@ -161,12 +150,11 @@ import numpy as np
 import posse
 import closing
 import steady
-import twice
 import walls
 from tests.support.reference.state import directions, points
 
 settings = dict(
-    extra_fields=("closing_speed", "wall_distance", "twice"),
+    extra_fields=("closing_speed", "wall_distance"),
     target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
     num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
@@ -187,8 +175,6 @@ for step in range(60):
     speed = np.column_stack([batch.state["tracker_speed"], batch.state["world_speed"]])
     wall = s.arena / 2 - s.robot_radius - np.maximum(abs(place.real), abs(place.imag))
     np.testing.assert_allclose(o["wall_distance"], wall, rtol=1e-5, atol=1e-5)
-    np.testing.assert_array_equal(o["twice"][..., 0], np.where(speed > 0, 1, -1))
-    np.testing.assert_array_equal(o["twice"][..., 1], 4)
     velocity = speed * heading
     for i in range(5):
         number = o["neighbour_number"][:, i].astype(int)
@@ -215,13 +201,12 @@ print("done")
 @pytest.mark.long
 def test_fields_and_terms_are_part_of_the_kernel(tmp_path: Path) -> None:
     """Of that of any scenario, which is kept on disk until a term is edited."""
-    modules = {**EXAMPLES, "twice": TWICE}
     for _ in range(2):
-        done = run(tmp_path, FIELDS_AND_TERMS, **modules)
+        done = run(tmp_path, FIELDS_AND_TERMS, **EXAMPLES)
         assert done.stdout == "done\n", done.stderr
     assert "compiling kernels" not in done.stderr
     steady = EXAMPLES["steady"].replace("return 1 -", "return 2 -")
-    assert "Not equal to tolerance" in run(tmp_path, FIELDS_AND_TERMS, **{**modules, "steady": steady}).stderr
+    assert "Not equal to tolerance" in run(tmp_path, FIELDS_AND_TERMS, **{**EXAMPLES, "steady": steady}).stderr
 
 
 MOTION_SENSOR_AND_METRIC = """
