@@ -67,9 +67,7 @@ def check(settings: Any) -> None:
 def tunables(settings: Any) -> tuple[Tunable, ...]:
     """Return the tunable fields of a settings object, with its values as defaults."""
     return tuple(
-        Tunable(
-            field.name, getattr(settings, field.name), *(field.metadata[k] for k in ("low", "high", "unit", "above"))
-        )
+        Tunable(field.name, getattr(settings, field.name), **field.metadata)
         for field in dataclasses.fields(settings)
         if "above" in field.metadata  # only `tuned` says it
     )

@@ -116,19 +116,15 @@ class Recorder:
                 )
         groups = {"state": tuple(batch.state), "terms": ("reward",), "annotations": ("annotation",)}
         self._names = dict.fromkeys(each for name in names for each in groups.get(name, (name,)))
-        self._clear()
 
-    def _clear(self) -> None:
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
+        """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
+        observations = self.batch.reset(seed=seed, options=options)
         self.over = np.zeros(self.batch.num_worlds, np.bool_)
         self.steps = 0
         self._lengths = np.zeros(self.batch.num_worlds, np.int64)
         self._rows: dict[str, list[Array]] = defaultdict(list)
         self._metrics: dict[str, npt.NDArray[np.float64]] = {}
-
-    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
-        """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
-        observations = self.batch.reset(seed=seed, options=options)
-        self._clear()
         self._keep_frame(self.batch.everyone[1].observations if isinstance(self.batch, PairedBatch) else observations)
         return observations
 
@@ -263,17 +259,14 @@ def rollout(
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)
-    begins = np.zeros(batch.num_worlds, np.bool_)
     while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
         actions, memory = policy.act(observations, memory)
         annotations = policy.annotations(memory) if "annotations" in record else None
         observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
         ended = terminated | truncated
-        # In the mode "next_step", the step after the end begins the next episode.
-        begins = begins if batch.autoreset == "next_step" else ended
+        begins = batch.worlds["step"] == 0
         if begins.any():
             memory = policy.restart(memory, begins)
-        begins = ended
         if after_step is not None:
             after_step(memory)
         if batch.autoreset == "disabled" and ended.any() and not ended.all():

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -32,7 +31,6 @@ AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
 Makers = dict[str, Callable[[], Any]]
 """What makes each policy, or target, that comes with the package."""
-_MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
 @dataclass(frozen=True)
@@ -158,8 +156,6 @@ def is_file(path: str | Path) -> bool:
 
 def _from_module(text: str) -> Any:
     """Return what ``"package.module:Class"`` makes, or an attribute that is no class."""
-    if not _MODULE.fullmatch(text):
-        raise PolicyError(f"{text!r:.120} names no class: write package.module:Class, for example my_policies:Circle")
     module_name, _, attribute = text.partition(":")
     try:
         module = importlib.import_module(module_name)
@@ -169,5 +165,6 @@ def _from_module(text: str) -> Any:
         return found() if isinstance(found, type) else found
     except Exception as error:  # whatever the code of the module or the class raises
         raise PolicyError(
-            f"{text!r:.120} cannot be imported, or created without arguments: {type(error).__name__}: {error}"
+            f"{text!r:.120} cannot be imported, or created without arguments: {type(error).__name__}: {error}; write "
+            "package.module:Class, for example my_policies:Circle"
         ) from error

@@ -117,8 +117,9 @@ def test_a_restarted_world_plays_as_a_new_one(name: str) -> None:
         repeated, memory = policy.act(observations, memory)
         np.testing.assert_array_equal(repeated[1], actions[1])
         differs |= not np.array_equal(repeated[0], actions[0])
+    # In these steps no tracker sees the target, so that one that hears nobody has nothing to remember.
     remembers = isinstance(policy, DDCS) or getattr(policy, "adviser", None) is not None
-    assert differs == remembers
+    assert differs == (remembers and name != "ddcs-no-radio")
 
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step"])

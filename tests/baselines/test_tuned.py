@@ -11,6 +11,7 @@ import pytest
 
 import posse
 from posse_baselines import DDCS, PolicyError, load, play, policy_names
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED, read_tuned, tuned_files
 from posse_training import evaluate
 
@@ -64,7 +65,7 @@ def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None
 def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path) -> None:
     values = json.loads(path.read_text())["settings"]
     tuned = play(batch_of(path.stem), load(name))["score"]
-    by_hand = play(batch_of(path.stem), DDCS.of(TUNED[name]).with_settings(**values))["score"]
+    by_hand = play(batch_of(path.stem), DDCS(FAMILY[TUNED[name]]).with_settings(**values))["score"]
     untuned = play(batch_of(path.stem), load(TUNED[name]))["score"]
     from_file = play(batch_of(path.stem), load(path))["score"]
     np.testing.assert_array_equal(tuned, by_hand)

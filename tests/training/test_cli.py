@@ -102,7 +102,7 @@ INVALID = {
     "train --side target --encoding features": "encoding='features'",
     "train --side target --reward-weights slot=1.0": "unknown term of a target 'slot'",
     "train --side target --algorithm mappo": "mappo",
-    "train --beside :x": "':x' names no class",
+    "train --beside :x": "':x' cannot be imported",
     "train --imitate pursuit": "safeguard=True does not go with imitate='pursuit'",
     "train --preset residual --advise planner": "'planner'",
     "train --wandb project": "pip install wandb",

@@ -9,7 +9,8 @@ import pytest
 from tests.support.runs import killed_at, quiet
 from tests.support.tunable import BEST, POLICY, small
 
-from posse_baselines import DDCS, tunables
+from posse_baselines import tunables
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.tune import Space, TuneSettings, _Run, tune
@@ -68,7 +69,7 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
 
 
 def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_default() -> None:
-    settings = DDCS.of("ddcs-distributed").settings
+    settings = FAMILY["ddcs-distributed"]
     found = tunables(settings)
     space = Space(found, [t.name for t in found])
     rng = np.random.default_rng(1)

@@ -41,7 +41,7 @@ from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, check_observations
 
 BASELINE: Final = Settings(
     model="centralized",
@@ -89,35 +89,16 @@ class DDCS(BasePolicy):
         self.settings = settings or Settings()
         self.name = name or f"ddcs-{self.settings.model}"
 
-    @classmethod
-    def of(cls, name: str) -> DDCS:
-        """Return a member of the DDCS family by name, such as ``"pngl-l-phi"``.
-
-        Raises:
-            PolicyError: No member of that name.
-        """
-        if name not in FAMILY:
-            raise PolicyError(f"policy {name!r} has no settings; those that have: {', '.join(FAMILY)}")
-        return DDCS(FAMILY[name], name)
-
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings that are played on a scenario."""
         return self.settings
 
     def with_settings(self, **values: Any) -> DDCS:
-        """Return a policy with some settings changed.
-
-        Raises:
-            ValueError: A value out of its range.
-        """
+        """Return a policy with some settings changed; ValueError if a value is out of its range."""
         return DDCS(self.settings.replace(**values), self.name)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` teams at the start of an episode.
-
-        Raises:
-            PolicyError: The scenario's messages are too small.
-        """
+        """Return the memory of ``num_worlds`` teams at the start; PolicyError if messages are too short."""
         super().begin(layout, num_worlds)
         scenario = layout.scenario
         return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)

@@ -18,7 +18,7 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,
     "idle": Idle,
     "pursuit": Pursuit,
-    **{name: partial(DDCS.of, name) for name in FAMILY},
+    **{name: partial(DDCS, settings, name) for name, settings in FAMILY.items()},
     **{name: partial(TunedDDCS, name) for name in TUNED},
     "belief-planner": BeliefPlanner,
     "planner": Planner,

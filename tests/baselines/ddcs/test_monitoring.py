@@ -9,6 +9,7 @@ import pytest
 import posse
 from posse_baselines import begin, load, rollout
 from posse_baselines.ddcs import DDCS
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
 
 
@@ -39,7 +40,7 @@ def test_the_estimate_is_nearer_to_the_target_than_the_fix(
 def test_noise_of_the_headings_is_filtered() -> None:
     noise, errors = 0.1, {}
     for trust in (1.0, 0.1):
-        policy = DDCS.of("ddcs-distributed").with_settings(heading_trust=trust)
+        policy = DDCS(FAMILY["ddcs-distributed"]).with_settings(heading_trust=trust)
         batch = posse.batch("smart", 20, message_size=5, autoreset="disabled", split="train", heading_noise=noise)
         played = rollout(batch, policy, ["annotations", "target_pose"], steps=120)
         wrong = played["annotation/estimate"][61:, ..., 2] - played["target_pose"][61:-1, :, None, 2]

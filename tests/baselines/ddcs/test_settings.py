@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import DDCS, PolicyError, begin, load, play, tunables
+from posse_baselines import DDCS, begin, load, play, tunables
 from posse_baselines.ddcs import Settings
 from posse_baselines.ddcs.baseline import FAMILY
 
@@ -31,27 +31,25 @@ def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) 
 
 @pytest.mark.parametrize("name", FAMILY)
 def test_tunables_have_the_values_of_their_policy(name: str) -> None:
-    found = {t.name: t for t in tunables(DDCS.of(name).settings)}
+    found = {t.name: t for t in tunables(FAMILY[name])}
     assert len(found) > 20
     for t in found.values():
         assert t.low <= t.default <= t.high
-        assert t.default == getattr(DDCS.of(name).settings, t.name)
+        assert t.default == getattr(FAMILY[name], t.name)
     assert "spread" not in found
 
 
 def test_both_ends_of_each_range_can_be_played() -> None:
     batch = posse.batch("field", 2, message_size=5, horizon=40)
     for end in ("low", "high"):
-        values = {t.name: getattr(t, end) for t in tunables(DDCS.of("pngl-l-phi").settings)}
+        values = {t.name: getattr(t, end) for t in tunables(FAMILY["pngl-l-phi"])}
         values |= {"near": 0.1, "far": 4.0, "range_near": 0.1, "range_far": 4.0}
-        assert np.isfinite(play(batch, DDCS.of("pngl-l-phi").with_settings(**values))["score"]).all()
+        assert np.isfinite(play(batch, DDCS(FAMILY["pngl-l-phi"]).with_settings(**values))["score"]).all()
 
 
-def test_other_policies_have_no_settings_of_the_ddcs() -> None:
-    with pytest.raises(PolicyError, match="policy 'idle' has no settings; those that have: pngl-l"):
-        tunables(DDCS.of("idle").settings)
+def test_an_unknown_setting_is_refused() -> None:
     with pytest.raises(TypeError, match="gian"):
-        DDCS.of("pngl").with_settings(gian=1.0)
+        DDCS(FAMILY["pngl"]).with_settings(gian=1.0)
 
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])

@@ -10,13 +10,14 @@ from tests.support.reference.score import slots
 import posse
 from posse_baselines import DDCS, play
 from posse_baselines.ddcs import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.ddcs.settings import NO_EXCHANGE
 
 NO_RETURN = ("exchange>converging", "exchange>flocking")
 
 
 def metrics(name: str, scenario: str, *forbidden: str) -> dict[str, Any]:
-    policy = DDCS.of(name).with_settings(forbidden=forbidden)
+    policy = DDCS(FAMILY[name]).with_settings(forbidden=forbidden)
     return play(posse.batch(scenario, 24, seed=3, split="train", message_size=5), policy)
 
 
@@ -35,7 +36,7 @@ def test_searching_lasts_until_the_target_is_seen_or_reported() -> None:
 
 
 def test_converging_and_flocking_change_with_hysteresis() -> None:
-    settings = DDCS.of("ddcs-distributed").settings
+    settings = FAMILY["ddcs-distributed"]
     wedge = slots(posse.get_scenario("accelerating"))
     begun, before = 0, None
     for now in drive("ddcs-distributed", "accelerating", 20, 250, split="train"):

@@ -6,9 +6,10 @@ from tests.support.learned import network_for
 
 import posse
 from posse_baselines import DDCS, PolicyError, load, play
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.learned import Encoding, LearnedPolicy
 
-SCRIPT = DDCS.of("ddcs-distributed")
+SCRIPT = DDCS(FAMILY["ddcs-distributed"])
 
 
 def listener(answer: tuple[float, float], kind: str = "features", safeguard: bool = False) -> LearnedPolicy:

@@ -12,6 +12,7 @@ from tests.support.drive import Instant, complex_of, drive
 
 from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import FLOCKING
+from posse_baselines.ddcs.baseline import FAMILY
 
 OFFSET = 0.15  # m, of the control point
 ALPHA = 2.0  # 1/s
@@ -54,7 +55,7 @@ def arms(seen: list[Instant], robot: int, mate: int) -> npt.NDArray[np.complex12
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
     wanted = PLACE + OFFSET
     for error in (0.3 + 0.2j, -0.3 + 0.2j, -0.3j, -0.4 + 0j, 0.2 + 0.3j):
-        seen = team(DDCS.of("pngl-l-phi").with_settings(follower_frame=frame), error, dt=dt)
+        seen = team(DDCS(FAMILY["pngl-l-phi"]).with_settings(follower_frame=frame), error, dt=dt)
         assert all((now.notes["task"] == FLOCKING).all() for now in seen)
         arm = arms(seen, 1, 0)
         decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
@@ -67,7 +68,9 @@ def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float)
 @pytest.mark.parametrize(("frame", "rate"), [("leader", 0.25), ("slot-frame", 0.15)])
 def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(frame: str, rate: float) -> None:
     # Figure 6: on a circle the formation turns with its frame, and the follower's centre keeps to its place in it.
-    policy = DDCS.of("pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized").with_settings(follower_frame=frame)
+    policy = DDCS(FAMILY["pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized"]).with_settings(
+        follower_frame=frame
+    )
     for now in team(policy, 0j, seconds=20.0, target=lambda _: (0.8, rate))[-50:]:
         place = complex_of(now.tracker)[0]
         axis = now.psi[0] if frame == "slot-frame" else now.tracker[0, 0, 2]

@@ -12,6 +12,7 @@ from tests.support.reference.score import slots
 from posse import get_scenario
 from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import CONVERGING, FLOCKING
+from posse_baselines.ddcs.baseline import FAMILY
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
 RATIOS = (1.2, 1.5, 2.0, 3.0)
@@ -60,7 +61,7 @@ def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(dt: float, 
 
 @pytest.mark.parametrize("general", [0.9, 1.1])
 def test_pngl_as_printed_meets_its_target_when_its_equations_say(general: float) -> None:
-    policy = DDCS.of("velocity-pursuit").with_settings(navigation_constant=general)
+    policy = DDCS(FAMILY["velocity-pursuit"]).with_settings(navigation_constant=general)
     for k in (1.5, 3.0):
         times = intercept_times(policy, k, 0.1, general)
         exact = [exact_time(k, aspect, general) for aspect in ASPECTS]

@@ -17,6 +17,7 @@ from matplotlib.patches import Circle, Patch
 import posse
 from posse_baselines import DDCS, Trajectory
 from posse_baselines.ddcs import TASKS
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_training.reproduce import runs
 from posse_training.reproduce.runs import Floats, relative, slot_error, times, told
 from posse_training.style import BLUE, GREEN, GREY, GRID, INK, ORANGE, PINK, RED, note, subplots
@@ -145,7 +146,7 @@ def tracks(seed: int) -> Figure:
     start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
     for column, name in enumerate(("velocity-pursuit", "pngl")):
         for number, k in enumerate((0.9, 1.0, 1.1)):
-            policy = DDCS.of(name).with_settings(navigation_constant=k)
+            policy = DDCS(FAMILY[name], name).with_settings(navigation_constant=k)
             run = runs.run_of(policy, alone, 1, seed, start)
             _track(axes[:, column], run, 0, number, f"K = {k:g}")
             if column == 0:
