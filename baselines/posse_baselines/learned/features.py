@@ -57,12 +57,8 @@ ESTIMATE: Final = record_type(("age", _F), ("place", _C), ("speed", _F))
 """What a tracker remembers of the target: the age of its fix, s, -1 while it is unknown; where it was, m, and its
 speed, m/s."""
 
-TEAM: Final = record_type(
-    ("count", np.int64),
-    ("working", np.int64),  # of these; the others are taken for broken
-    ("places", _C, (MOST,)),  # m
-)
-"""The robots that a tracker knows of, itself among them, as :func:`write_features` works with them."""
+
+Places = npt.NDArray[np.complex64]
 
 
 class Known(NamedTuple):
@@ -70,7 +66,7 @@ class Known(NamedTuple):
 
     at: Records
     """Offsets of an observation's fields, an array of one record."""
-    slots: npt.NDArray[np.complex64]
+    slots: Places
     """(N,) in the slot frame, m."""
     first: bool
     """Whether of more slots than robots the first is filled at any rate."""
@@ -81,19 +77,19 @@ class Known(NamedTuple):
 
 
 @compiled
-def write_features(row: FloatArray, known: Known, estimate: Record, team: Record, work: Work, out: Record) -> None:
+def write_features(row: FloatArray, known: Known, estimate: Record, places: Places, work: Work, out: Record) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros, and update the estimate.
 
-    It works in ``team``, a :data:`TEAM`, and ``work``.
+    It works in ``places`` (MOST,) and ``work``.
     """
     f, slots = known.at[0], known.slots
-    _gather_team(row, f, known.patience, team)
+    count, working = _gather_team(row, f, known.patience, places)
     top = row[f.max_speed]
     out.speed = row[f.speed] / top
     if row[f.target_known] <= 0.0:
         estimate.age = -ONE
         # As if the own slot were far away in the direction to explore in.
-        way = _explore(row, f, team)
+        way = _explore(row, f, places[1:count])
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
@@ -105,11 +101,11 @@ def write_features(row: FloatArray, known: Known, estimate: Record, team: Record
     for s in range(len(slots)):
         place = target + slots[s] * frame
         more = _OUTSIDE if _is_outside(row, f, place) else ZERO
-        if s == 0 and known.first and team.working < team.count:
+        if s == 0 and known.first and working < count:
             more -= _FIRST
-        for j in range(team.working):
-            work.cost[j, s] = length(team.places[j] - place) + more
-    assign(work.cost[: team.working], work.assigning)
+        for j in range(working):
+            work.cost[j, s] = length(places[j] - place) + more
+    assign(work.cost[:working], work.assigning)
     slot = slots[int(work.assigning[0, 0])]
     way = target + slot * frame
     d = length(way)
@@ -171,11 +167,11 @@ def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64],
 
 
 @compiled
-def _explore(row: FloatArray, f: Record, team: Record) -> complex:
+def _explore(row: FloatArray, f: Record, mates: Places) -> complex:
     """Return the direction in which a tracker explores: ahead, away from team-mates and from walls."""
     way = complex(1.0, 0.0)
-    for j in range(1, team.count):
-        way += push_from(team.places[j], _SPREAD)
+    for j in range(len(mates)):
+        way += push_from(mates[j], _SPREAD)
     if row[f.arena] > 0.0:
         place, x, y = pair(row, f.position), 0.25 * row[f.arena], 0.25 * _height(row, f)
         inwards = complex(push_inwards(place.real, x), push_inwards(place.imag, y))
@@ -206,20 +202,21 @@ def _soft(v: complex, scale: np.float32) -> complex:
 
 
 @compiled
-def _gather_team(row: FloatArray, f: Record, patience: np.float32, team: Record) -> None:
-    """Write the present positions of the known team, own robot first.
+def _gather_team(row: FloatArray, f: Record, patience: np.float32, places: Places) -> tuple[int, int]:
+    """Write the present positions (m) of the known team, own robot first; return how many, and how many of them work.
 
     Robots silent for longer than the ``patience`` (s) are taken for broken, and come last.
     """
-    team.places[0], team.count = 0j, 1
+    places[0], count, working = 0j, 1, 1
     for silent in (False, True):
         for p in range(f.neighbours):
             place = p * f.stride
             age = row[f.neighbour_age + place]
-            if row[f.neighbour_number + place] >= ZERO and (age > patience) == silent and team.count < MOST:
+            if row[f.neighbour_number + place] >= ZERO and (age > patience) == silent and count < MOST:
                 way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
                 run = row[f.neighbour_speed + place] * min(age, _OLDEST)
-                team.places[team.count] = way + scaled(pair(row, f.neighbour_heading + place), run)
-                team.count += 1
+                places[count] = way + scaled(pair(row, f.neighbour_heading + place), run)
+                count += 1
         if not silent:
-            team.working = team.count
+            working = count
+    return count, working

@@ -20,7 +20,7 @@ from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
 from posse_baselines.laws.steering import Work, work_for
-from posse_baselines.learned.features import ESTIMATE, FEATURES, NUM_FEATURES, TEAM, Known, write_features
+from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, Known, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "features")
@@ -172,7 +172,7 @@ class Encoder(OwnArrays):
         self._columns, self._unknown = encoding.columns(layout)
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
         # What features are computed in, one of each for a thread.
-        work = np.empty(MOST_THREADS, TEAM), work_for(len(slots))
+        work = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(slots))
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
         noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
@@ -219,7 +219,7 @@ def _patience(scenario: Scenario) -> float:
 def _write_all(
     rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
 ) -> None:
-    known, teams, w = given
+    known, places, w = given
     work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
     for r in range(first, end):
-        write_features(rows[r], known, estimates[r], teams[thread], work, features[r])
+        write_features(rows[r], known, estimates[r], places[thread], work, features[r])
