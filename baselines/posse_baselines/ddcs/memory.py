@@ -173,6 +173,7 @@ MIND: Final = _record(
     usual_gap=_F(0),  # about the longest silence of a team-mate lately, s
     patience=np.float64(0),  # silence up to which a team-mate counts as working and in range, s
     others=_I(0),  # how many do
+    usual_age=_F(0),  # about the usual age of the fix, s
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none

@@ -25,6 +25,7 @@ _FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
 _JUMP: Final = 1.0  # m; a fix farther than this from the estimate replaces it
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
+_LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
 _GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
 _UNSEEN_MEMORY: Final = 2.5  # s; timeout of team-mates that may have had no place in the observation
 
@@ -129,6 +130,9 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     if me.fix_step < 0:
         return
     me.fix_age = since(team, me, me.fix_step)
+    if me.fix_age <= _LATE:
+        # The usual age of fixes, to detect unusual delays.
+        me.usual_age += (dt / _GAP_MEMORY) * (me.fix_age - me.usual_age)
     if me.fix_age <= settings.target_lost_after:
         me.known = 1
     me.target, theta = target_after(team, me, me.fix_age)

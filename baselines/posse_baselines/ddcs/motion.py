@@ -25,6 +25,7 @@ from posse_baselines.laws.exploration import push_from, push_inwards
 from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
+_FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 _LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, below which it is l-φ on the nearer robot
@@ -89,6 +90,8 @@ def move(team: Team, me: Record, mates: Records) -> None:
         want(me, explore(team, me, mates), 0.0)
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
+    elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
+        hunt(team, me)
     elif follows(team, me, mates):
         if me.task == FLOCKING:
             follow(team, me, mates)
@@ -101,6 +104,20 @@ def move(team: Team, me: Record, mates: Records) -> None:
         pursue(team, me)
     else:
         hold_slot(team, me)
+
+
+@compiled
+def hunt(team: Team, me: Record) -> None:
+    """Set the motion to see a lost target again.
+
+    The team spreads on a ring around its predicted position, slot by slot on either side of its
+    heading; the ring grows with the time that it was not seen.
+    """
+    settings = team.settings
+    side = 1.0 if me.slot % 2 else -1.0
+    angle = me.target_theta + side * ((me.slot + 1) // 2) * 2.0 * math.pi / len(team.slots)
+    way = me.target + vector(settings.hunt_growth * me.fix_age, angle) - me.position
+    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))), 0.0)
 
 
 @compiled

@@ -104,6 +104,11 @@ class Settings:
     """Bonus of a slot from which the target is in sight, as arrival time."""
     in_sight: float = tuned(0.95, "", 0.1, 1.0)
     """Share of the sensing range within which a slot counts as seeing the target."""
+    close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
+    """With a fix older than this, beyond the usual age, the team moves to a ring around the
+    predicted position of the target, to see it again."""
+    hunt_growth: float = tuned(0.3, "m/s", 0.0, 1.0)
+    """Growth rate of that ring."""
 
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)
