@@ -153,8 +153,6 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
 
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
-        Safeguard(posse.parallel_env("smart", discrete_actions=True))
-    with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))
     with pytest.raises(TypeError, match="neither"):
         Safeguard(3)

@@ -44,7 +44,6 @@ MISTAKES: Final = {
     SENSOR.format("c", '"own", fix="range"'): r"sensor own \(main.py:3\): unknown fix='range'; allowed: pos",
     SENSOR.format("c", '"own", measure=m'): r"sensor m \(main.py:1\): its parameters are \(c\), not \(c, w, number, dx",
     # What the compiler says.
-    TERM.format("c, w, t", "return t.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did",
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did you mean",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"line 4: .*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"line 4: it creates an array, a list or a text",

@@ -19,8 +19,6 @@ from posse_baselines.ddcs.baseline import FAMILY
         ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
         ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
-        ({"navigation_constant": 1.2}, r"navigation_constant=1.2 must lie in \[0.9, 1.1\]"),
-        ({"follower_law": "l-psi"}, "follower_law='l-psi' is unknown; known: l-phi, l-l"),
         ({"forbidden": ("flocking>flocking",)}, "forbidden='flocking>flocking' is unknown"),
     ],
 )

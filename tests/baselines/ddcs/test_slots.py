@@ -14,7 +14,6 @@ from posse_baselines.ddcs.baseline import FAMILY
 @pytest.mark.parametrize(
     ("worlds", "settings"),
     [
-        (40, {}),
         (40, {"formation": "ring", "num_trackers": 6}),
         (40, {"formation": "rows", "num_trackers": 9}),
         (40, {"radio_loss": 0.3, "radio_delay": 2}),

@@ -75,8 +75,6 @@ def player(name: str, scores: list[float], *events: tuple[int, str]) -> Player:
         ([*WAY, *FULL[:20], *[0.0] * 20], [(31, "break")], f"40 %; {MOST} after 1 break."),
         ([*WAY, *WAY, *FULL[:30]], [(5, "dart")], f"60 %; {MOST} on the way to the slots."),
         ([*WAY, *[0.9] * 40], [], "72 %."),  # nowhere in particular
-        ([*WAY, *FULL], [(11, "dart")], "80 %."),
-        ([*WAY, *WAY[:5], *FULL[:5], *WAY, *FULL[:20]], [(21, "dart")], f"50 %; {MOST} in 1 dart."),
         ([*WAY, *FULL[:10], *([*WAY, *FULL[:5]] * 2)], [(21, "dart"), (36, "dart")], f"40 %; {MOST} in 2 darts."),
         ([*WAY, *FULL], [(15, "contact")], "80 % (none counts from its contact at 1.5 s on)."),
     ],

@@ -27,7 +27,6 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ("search", "trackers", "cmaes"),
         ("search,field", "trackers", "cmaes"),
         ("search,smart", "trackers", "ppo"),
-        ("smart", "trackers", "ppo"),
         ("search", "target", "ppo"),
     ],
 )
@@ -41,7 +40,6 @@ def test_the_scenario_decides_on_the_algorithm(scenario: str, side: str, algorit
         "{",
         "[]",
         '{"steps": NaN}',
-        '{"steps": 1.5}',
         '{"side": "neither"}',
         '{"overrides": [1]}',
         '{"hidden": {"a": 1}}',
