@@ -20,9 +20,6 @@ SHORT: dict[str, Any] = {"num_trackers": 2, "horizon": 4, "settle_time": 0.1}
 LONG_NAME = "x" * 5000
 
 
-TEAM, SOLO, TRACKER = "posse/Team-v0", "posse/Solo-v0", "posse/Tracker-v0"
-
-
 def _batch(**settings: Any) -> posse.Batch:
     return posse.batch(**{"scenario": "constant", "num_worlds": 2, **SHORT, **settings})
 
@@ -44,11 +41,11 @@ def _torchrl() -> Any:
 MAKERS: dict[str, Callable[..., Any]] = {
     "batch": _batch,
     "parallel": lambda **settings: posse.parallel_env(**{**SHORT, **settings}),
-    "team": functools.partial(_single, TEAM),
-    "solo": functools.partial(_single, SOLO, num_trackers=1),
-    "tracker": functools.partial(_single, TRACKER),
-    "team vector": functools.partial(_vector, TEAM),
-    "solo vector": functools.partial(_vector, SOLO, num_trackers=1),
+    "team": functools.partial(_single, "posse/Team-v0"),
+    "solo": functools.partial(_single, "posse/Solo-v0", num_trackers=1),
+    "tracker": functools.partial(_single, "posse/Tracker-v0"),
+    "team vector": functools.partial(_vector, "posse/Team-v0"),
+    "solo vector": functools.partial(_vector, "posse/Solo-v0", num_trackers=1),
     "torchrl": _torchrl,
 }
 

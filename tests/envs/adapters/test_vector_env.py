@@ -1,5 +1,6 @@
 """The vector environments agree with Gymnasium's own over single ones, infos included."""
 
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -43,13 +44,8 @@ def test_the_vector_environment_agrees_with_gymnasiums(
 ) -> None:
     name = f"posse/{name}-v0"
     ours = vector(name, autoreset=mode.name.lower(), **settings)
-    theirs = SyncVectorEnv(
-        [
-            lambda i=i: gymnasium.make(name, first_world=i, **settings)  # type: ignore[misc]
-            for i in range(E)
-        ],
-        autoreset_mode=mode,
-    )
+    makers = [partial(gymnasium.make, name, first_world=i, **settings) for i in range(E)]
+    theirs = SyncVectorEnv(makers, autoreset_mode=mode)
     assert ours.autoreset_mode is ours.metadata["autoreset_mode"] is mode
     assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
     terminations, truncations = play_both(ours, theirs, mode, 80)
