@@ -12,10 +12,8 @@ from PIL import Image
 from tests.support.browser import chromium, opened, until
 from tests.support.replays import ATTACK, hostile, short
 
-import posse
 from posse.rendering.style import GROUND, TARGET
-from posse_baselines import Recorder
-from posse_training.replay import RECORD, read_replay, record, replay_of, write_replay
+from posse_training.replay import read_replay, record, write_replay
 from posse_training.replay.page import command, verdict
 
 if TYPE_CHECKING:
@@ -283,12 +281,6 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
 
 
 def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:
-    batch = posse.batch("smart", 1, target_motion="agent")
-    recorder = Recorder(batch, RECORD)
-    recorder.reset()
-    for _ in range(20):
-        recorder.step(np.zeros(batch.action_shape, np.float32))
-    replay = replay_of(recorder.trajectory(), "me")
-    n = batch.scenario.num_trackers
-    with opened(browser, write_replay(replay, tmp_path / "a.html"), f"#t=1&r={n}") as page:
+    replay = record(["idle"], "duel", num_trackers=3, target="eight", seconds=2, observations=False)
+    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=1&r=3") as page:
         assert page.locator("#panel h2").inner_text().startswith("target")
