@@ -45,11 +45,6 @@ class Crashes(Idle):
         os._exit(9)
 
 
-class RaisesOnLoad(Idle):
-    def __init__(self) -> None:
-        raise LookupError("no weights")
-
-
 class Watched(BasePolicy):
     """``pursuit``, which in one shard does a deed: it ends the process, waits for the file ``go``, or fails.
 

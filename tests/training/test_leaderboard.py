@@ -28,18 +28,11 @@ def sent(folder: Path, claim: Standing, **changes: Any) -> Path:
     return folder
 
 
-def test_a_claim_is_what_an_evaluation_measures(claim: Standing) -> None:
+def test_a_claim_is_what_an_evaluation_measures_and_holds_on_fresh_worlds(claim: Standing, tmp_path: Path) -> None:
     played = evaluate("pngl", SCENARIO, WORLDS, 2026)
     assert claim.safe_score == pytest.approx(played["safe_score"].mean(), abs=1e-6, rel=0)
     assert (claim.seed, claim.worlds, claim.reads_state) == (2026, WORLDS, False)
-
-
-def test_an_honest_claim_holds_on_fresh_worlds(
-    claim: Standing, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ["verify", str(sent(tmp_path, claim)), "--episodes", str(WORLDS), "--seed", "3"]
-    assert cli.main(arguments) == 0
-    assert "the claim holds" in capsys.readouterr().out
+    assert cli.main(["verify", str(sent(tmp_path, claim)), "--episodes", str(WORLDS), "--seed", "3"]) == 0
 
 
 def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Standing, tmp_path: Path) -> None:
@@ -59,9 +52,6 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
         ({"scenario": "nowhere"}, "no scenario 'nowhere'"),
         ({"version": 99}, "of version 99"),
         ({"safe_score": "high"}, "could not convert"),
-        ({"seed": "one"}, "invalid literal"),
-        ({"reads_state": "maybe"}, "line 2"),
-        ({"commit": "<script>"}, "commit="),
         ({"policy": "forged_module:Policy"}, "--run-code"),
     ],
 )
@@ -81,12 +71,10 @@ def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
 
 
 def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = tmp_path / "kept.txt"
-    kept.write_text("mine", encoding="utf-8")
-    for out in (tmp_path, kept):
-        assert cli.main(["submit", "pursuit", "--out", str(out)]) == 2, capsys.readouterr()
+    (tmp_path / "kept.txt").write_text("mine", encoding="utf-8")
+    assert cli.main(["submit", "pursuit", "--out", str(tmp_path)]) == 2
+    assert "not an empty folder" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
-    assert kept.read_text(encoding="utf-8") == "mine"
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:

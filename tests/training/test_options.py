@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 import tyro
 
-import posse
 from posse_training.cli import main
 from posse_training.compare.compare import Settings
 from posse_training.options import settings_of, words_of
@@ -18,7 +17,6 @@ def test_settings_are_read_and_written_alike() -> None:
     values = {"arena": (6, 4), "target_speed": 0.5, "horizon": 40, "terminate_on_contact": True}
     assert settings_of(words) == {**values, "target_motion": "smart"}
     assert words_of(settings_of(words)) == words
-    assert posse.get_scenario("smart", **settings_of(["arena=6,4"])).arena == (6, 4)
     assert settings_of(["num_neighbours=none", "sensing_range=inf"]) == {
         "num_neighbours": None,
         "sensing_range": float("inf"),
@@ -30,12 +28,11 @@ def test_the_address_of_a_cluster_is_read(words: str, ray: bool | str) -> None:
     assert tyro.cli(Settings, args=["idle", *words.split()]).ray == ray
 
 
-def test_a_world_of_another_size_is_compared_and_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_world_of_another_size_is_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = ["--scenario", "obstacles", "--set", "arena=14,10", "num_obstacles=1", "horizon=20", "settle_time=1.0"]
     played = ["--episodes", "2", "--planner-episodes", "0", "--no-figures", "--out", str(tmp_path / "out")]
     assert main(["compare", "idle", *changes, *played]) == 0
     assert "arena=14,10" in capsys.readouterr().out.replace("\n", " ")
-    assert main(["replay", "idle", *changes, "--out", str(tmp_path / "r.html")]) == 0
 
 
 def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:

@@ -94,13 +94,6 @@ def test_what_is_not_in_the_way_is_passed_straight() -> None:
     assert turn([(1001.0, 0.0, 1000.0)], 1.0) == 0.0  # a wall
 
 
-def test_the_way_past_a_row_is_past_its_end() -> None:
-    row = [(1.5, 0.0, 0.6), (1.5, 0.9, 0.6)]
-    left, right = turn(row, 1.0), turn(row, -1.0)
-    assert left == pytest.approx(math.atan2(0.9, 1.5) + math.asin(0.8 / math.hypot(0.9, 1.5)))
-    assert right == pytest.approx(-math.asin(0.8 / 1.5))
-
-
 def test_an_enclosed_robot_finds_no_detour() -> None:
     ring = [(math.cos(a), math.sin(a), 0.6) for a in np.arange(8) * math.pi / 4]
     assert abs(turn(ring, 1.0)) > 2.0

@@ -22,12 +22,6 @@ def test_impossible_settings_are_refused() -> None:
         PlannerSettings(look_ahead=0.0)
 
 
-@pytest.mark.long
-def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
-    metrics = play(posse.batch("constant", 10, split="train"), Planner(QUICK))
-    assert metrics["safe_score"].mean() >= 0.9 * metrics["bound"].mean()
-
-
 @pytest.mark.parametrize(
     ("planner", "script", "scenario", "worlds", "settings"),
     [

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from gymnasium.error import ResetNeeded
 from tests.support.process import printed
 
 import posse
@@ -101,10 +100,7 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
     assert printed("-c", code).split() == ["False", "(640,", "640,", "3)", "False"]
 
 
-def test_invalid_arguments_are_named() -> None:
+def test_a_size_that_is_too_small_is_named() -> None:
     batch = posse.batch("smart")
     with pytest.raises(ValueError, match=r"size=\(100, 400\).*at least 200 px"):
         Renderer(batch.scenario, size=(100, 400))
-    renderer = Renderer(batch.scenario)
-    with pytest.raises(ResetNeeded, match="call reset"):
-        renderer.draw(batch)

@@ -8,7 +8,6 @@ from tests.support.process import run_tests_elsewhere
 
 from posse_baselines import from_function, load
 from posse_training import provenance
-from posse_training.cli import main
 from posse_training.commands.train import train_on_worker
 from posse_training.errors import ClusterError
 from posse_training.parallel import Job, cut
@@ -32,14 +31,6 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     provenance.sources.cache_clear()  # as in another process
     mine.write_text("class Team: # other\n    ...\n")
     assert [folder(each) == at for each, at in zip(names, folders, strict=True)] == [True] * 5 + [False]
-
-
-def test_a_folder_of_another_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "seed-1"
-    folder.mkdir()
-    (folder / "settings.json").write_text('{"steps": 5}')
-    assert main(["train", "--seed", "1", "2", "--out", str(tmp_path)]) == 2
-    assert "is damaged" in capsys.readouterr().err
 
 
 def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> None:

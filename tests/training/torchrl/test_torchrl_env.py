@@ -105,21 +105,6 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     assert env.batch.worlds["episode"].tolist() == [0, 1, 0, 1, 1, 0]
 
 
-def test_a_rollout_goes_on_with_the_next_episode() -> None:
-    env = PosseEnv("constant", WORLDS, seed=2, **SHORT)
-    batch = posse.batch("constant", WORLDS, seed=2, **SHORT)
-    rollout = env.rollout(12 + 12 + 2, break_when_any_done=False)
-    done = torch.zeros(26, dtype=torch.bool)
-    done[[11, 23]] = True
-    assert torch.equal(rollout["next", "done"].squeeze(-1), done.expand(WORLDS, -1))
-    observation = rollout["agents", "observation"]
-    next_observation = rollout["next", "agents", "observation"]
-    assert torch.equal(observation[:, 1:][:, ~done[:-1]], next_observation[:, :-1][:, ~done[:-1]])
-    batch.reset()
-    for step in (12, 24):
-        np.testing.assert_array_equal(observation[:, step].numpy(), batch.reset())
-
-
 def test_a_choice_of_autoreset_is_refused() -> None:
     with pytest.raises(TypeError, match=r"autoreset='same_step'.*leave it out"):
         PosseEnv("constant", WORLDS, autoreset="same_step")
