@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.engine.arguments import as_float32, in_box
-from posse.engine.batch import Batch, of_batch
+from posse.engine.batch import Batch
 from posse.engine.kernels import LOOK, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, get_scenario
@@ -148,21 +148,26 @@ def batch(
     scenario: str | Scenario = "constant",
     num_worlds: int = 1,
     *,
+    seed: int = 0,
+    split: str = "train",
+    first_world: int = 0,
+    autoreset: str = "next_step",
+    num_threads: int | None = None,
+    clip_actions: bool = False,
     target_policy: TargetPolicy | None = None,
     team_policy: TargetPolicy | None = None,
-    **settings: Any,
+    **overrides: Any,
 ) -> Batch:
-    """Return a batch of worlds, on which all environments are built.
-
-    The settings are further arguments of :class:`Batch`, or fields of :class:`posse.Scenario`.
+    """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
 
     With ``target_policy`` that policy moves the target of every world; observations, actions and
     rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
     are those of the target, one row and actions of two numbers. Both return a :class:`PairedBatch`;
     they exclude each other.
     """
-    own = of_batch(settings)
-    found = get_scenario(scenario, **settings)
+    own: dict[str, Any] = {"seed": seed, "split": split, "first_world": first_world, "autoreset": autoreset}
+    own |= {"num_threads": num_threads, "clip_actions": clip_actions}
+    found = get_scenario(scenario, **overrides)
     if target_policy is not None and team_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
     inside, side = (team_policy, "team") if target_policy is None else (target_policy, "target")
