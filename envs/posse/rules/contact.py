@@ -13,7 +13,7 @@ import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, compiled, greater, lesser, out_of_line, root
 from posse.numeric.lanes import bits, least, load
-from posse.rules.discs import TOUCHING_GAP, surroundings_within
+from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -60,7 +60,8 @@ def free_of_robots(
     The positions of ``count`` robots are in ``s.near_x`` and ``s.near_y``; the robot itself may be among them.
     """
     reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
-    for k in range(0, count, WIDTH):
+    for block in range(blocks(count)):
+        k = WIDTH * block
         share = min(share, least(free_share(x, y, dx, dy, load(s.near_x, k), load(s.near_y, k), reach)))
     return np.float32(share)
 
@@ -138,7 +139,8 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         w.contacts_target += 1
     # Other trackers.
     found = 0
-    for j in range(0, c.num_trackers, WIDTH):
+    for block in range(blocks(c.num_trackers)):
+        j = WIDTH * block
         x, y = load(s.x, j) - t.x, load(s.y, j) - t.y
         other = load(s.index, j) < np.float32(c.num_trackers)
         found |= bits((x * x + y * y <= touch * touch) & other) << j

@@ -24,6 +24,12 @@ _MINUS_ONE: Final = np.float32(-1.0)
 
 
 @compiled
+def blocks(count: int) -> int:
+    """Return the number of blocks for ``count`` discs or beams; a range with a step of ``WIDTH`` is slower."""
+    return (count + (WIDTH - 1)) >> 3
+
+
+@compiled
 def obstacle_within(obstacles: Records, x: np.float32, y: np.float32, reach: np.float32) -> bool:
     """Return whether the rim of an obstacle is nearer than ``reach`` to a point."""
     for o in obstacles:
@@ -95,7 +101,8 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
     # Padding first: a load of a block that covers two stores would have to wait for them.
     store(s.x, num_discs(c), eight(FAR))
     store(s.y, num_discs(c), eight(FAR))
-    for j in range(0, n + 1, WIDTH):
+    for block in range(blocks(n + 1)):
+        j = WIDTH * block
         pose = Pose(*columns(trackers, j, n, POSE))
         number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
@@ -129,7 +136,8 @@ def find_gaps(c: Record, s: Record) -> None:
     tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.control_step
     target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.control_step
     margin = TOUCHING_GAP + c.fastest * c.control_step
-    for i in range(0, n, WIDTH):
+    for block in range(blocks(n)):
+        i = WIDTH * block
         x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)
         # All robots have one radius, so the nearest is found without a square root for each.
         nearest2 = eight(FAR)

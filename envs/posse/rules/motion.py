@@ -14,7 +14,7 @@ import numpy as np
 from posse.numeric import HALF, ONE, WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, out_of_line
 from posse.numeric.lanes import eight, greater, lesser, load, store, store_fields
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import FAR, columns, write_block
+from posse.rules.discs import FAR, blocks, columns, write_block
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.randomness import DRIFT, normal_pair
 from posse.rules.state import NEVER, POSE, Pose, WorldArrays
@@ -104,7 +104,8 @@ def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray
 def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
     n = c.num_trackers
-    for i in range(0, n, WIDTH):
+    for block in range(blocks(n)):
+        i = WIDTH * block
         pose = Pose(*columns(trackers, i, n, POSE))
         x, y, cosine, sine = pose.x, pose.y, pose.heading_cos, pose.heading_sin
         speed, turn_rate = pose.speed, pose.turn_rate

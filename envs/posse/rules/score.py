@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
-from posse.rules.discs import find_slots
+from posse.rules.discs import blocks, find_slots
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NEVER, NO_BITS
 
@@ -28,7 +28,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     taken = NO_BITS
-    for first in range(0, c.num_trackers, WIDTH):
+    for block in range(blocks(c.num_trackers)):
+        first = WIDTH * block
         find_slots(c, w, first, slots, taken, s)
     occupied = 0
     near2 = c.tolerance * c.tolerance
@@ -45,7 +46,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 occupied += 1
                 t.slot = best
     if taken != NO_BITS:
-        for first in range(0, c.num_trackers, WIDTH):
+        for block in range(blocks(c.num_trackers)):
+            first = WIDTH * block
             find_slots(c, w, first, slots, taken, s)
     for i, t in enumerate(trackers):
         if t.slot < 0 and s.slot[i] >= ZERO:

@@ -8,7 +8,7 @@ import numpy as np
 
 from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled, out_of_line
 from posse.numeric.lanes import bits, choose, eight, greater, lesser, load, lowest_bit, root, store
-from posse.rules.discs import FAR, num_discs, to_wall
+from posse.rules.discs import FAR, blocks, num_discs, to_wall
 from posse.rules.kinematics import in_frame
 
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
@@ -27,7 +27,8 @@ def echo_of_disc(c: Record, ahead: np.float32, left: np.float32, radius: np.floa
     nearest, least = greater(distance - radius - c.robot_radius, ZERO), c.beam_cosine * distance
     radius2 = radius * radius
     wide = radius2 >= (ONE - c.beam_cosine * c.beam_cosine) * distance * distance
-    for k in range(0, c.sonar_beams, WIDTH):
+    for block in range(blocks(c.sonar_beams)):
+        k = WIDTH * block
         cosine, sine, reading = load(s.beam_cos, k), load(s.beam_sin, k), load(s.reading, k)
         along = ahead * cosine + left * sine
         reading = lesser(reading, choose(along >= least, nearest, FAR))
@@ -50,7 +51,8 @@ def echo_of_walls(c: Record, robot: Record, s: Record) -> None:
             continue
         nearest = max(distance - c.robot_radius, ZERO)
         ahead, left = in_frame(normal_x, normal_y, robot.heading_cos, robot.heading_sin)
-        for k in range(0, c.sonar_beams, WIDTH):
+        for block in range(blocks(c.sonar_beams)):
+            k = WIDTH * block
             towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
             axis = greater(distance / greater(towards, TINY) - c.robot_radius, ZERO)
             found = choose(towards >= c.beam_cosine, nearest, choose(towards > ZERO, axis, FAR))
@@ -64,9 +66,11 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
     The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     x, y, cosine, sine = robot.x, robot.y, robot.heading_cos, robot.heading_sin
-    for k in range(0, c.sonar_beams, WIDTH):
+    for block in range(blocks(c.sonar_beams)):
+        k = WIDTH * block
         store(s.reading, k, eight(c.sonar_range))
-    for j in range(0, num_discs(c), WIDTH):
+    for block in range(blocks(num_discs(c))):
+        j = WIDTH * block
         dx, dy = load(s.x, j) - x, load(s.y, j) - y
         reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
         near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
