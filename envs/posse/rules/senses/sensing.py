@@ -10,6 +10,7 @@ import numpy as np
 from posse.declarations import sensor
 from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, compiled, root
 from posse.numeric.lanes import bits, load
+from posse.rules.discs import blocks
 from posse.rules.kinematics import turned
 from posse.rules.randomness import HEADING_NOISE, SENSOR_NOISE, normal_pair
 from posse.rules.state import NEVER
@@ -44,7 +45,8 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
     """
     d2 = dx * dx + dy * dy
     first = c.num_trackers + 1
-    for j in range(first, first + c.num_obstacles, WIDTH):
+    for block in range(blocks(c.num_obstacles)):
+        j = first + WIDTH * block
         ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)
         along, across = ox * dx + oy * dy, ox * dy - oy * dx
         meets = (along > ZERO) & (along < d2) & (across * across < radius * radius * d2)
