@@ -5,10 +5,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests.support.drive import drive
 
 import posse
+from posse.numeric import FloatArray
 from posse_baselines import load, play
+from posse_baselines.ddcs import DDCS, SEARCHING
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.policy import Memory
 
 
 @pytest.mark.parametrize(
@@ -66,3 +70,35 @@ def test_late_commands_and_drifting_poses_cost_the_team_little(name: str, fault:
     metrics = play(posse.batch("constant", 60, split="train", message_size=policy.message_size, **fault), policy)
     assert metrics["safe_score"].mean() >= 0.75
     assert (metrics["contact_free"] == 0).mean() <= 0.02
+
+
+@pytest.mark.parametrize(("reach", "comes"), [(3.0, True), (20.0, False)])
+def test_a_searcher_that_hears_no_other_comes_to_the_middle(reach: float, comes: bool) -> None:
+    start: dict[str, Any] = {"tracker_pose": [(4.0, 0.0, 1.57), (-4.0, 0.0, -1.57)], "target_pose": (0.0, 9.0, 0.0)}
+    start |= {"num_trackers": 2, "radio_range": reach, "start_distance": (4.0, 28.0)}
+    for now in drive("ddcs-distributed", "search", 1, 30, **start):
+        assert (now.notes["task"] == SEARCHING).all()
+    assert (np.hypot(now.tracker[..., 0], now.tracker[..., 1]) < 4.0).all() == comes
+
+
+class Blinded(DDCS):
+    """A team whose sensors fail after 40 s."""
+
+    steps = 0
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        self.steps += 1
+        seen = observations.copy()
+        if self.steps > 400:
+            views = memory.layout.views(seen)
+            views["target_known"][...], views["target_seen"][...] = 0.0, 0.0
+        return super().act(seen, memory)
+
+
+def test_on_the_open_plane_a_lost_target_is_searched_for_where_it_was_lost() -> None:
+    pose: dict[str, Any] = {"tracker_pose": [(5.0, 0.0, 0.0)], "target_pose": (8.0, 0.0, 0.0), "num_trackers": 1}
+    run = drive(Blinded(), "constant", 1, 1000, **pose)
+    places = np.array([now.tracker[0, 0, :2] for now in run if (now.notes["task"] == SEARCHING).all()])
+    assert len(places) > 400
+    assert places[0, 0] > 25.0
+    assert np.hypot(*(places - places[0]).T).max() < 15.0
