@@ -195,7 +195,7 @@ class WorldEnv(BatchEnv):
         if self.render_mode is not None:
             self._show()
 
-    def _info(self) -> dict[str, Any]:
+    def _common_info(self) -> dict[str, Any]:
         """Return the info of the last step or reset, without reward terms."""
         info = self._no_info.copy()
         info["score"] = self._own.scores.item()

@@ -67,7 +67,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
         self._shape = self.action_space.shape
-        self._rows_shape = 1, -1, self.batch.action_shape[2]
+        self._as_batch = (None, None) if isinstance(self._rows, int) else (None,)  # makes it (1, rows, 2 + m)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -82,13 +82,13 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         batch, own = self.batch, self._own
         batch.check_running()
         motions = as_motions("action", action, self._shape, self._discrete)
-        self._advance(in_box(motions.reshape(self._rows_shape), batch.clip_actions))
+        self._advance(in_box(motions[self._as_batch], batch.clip_actions))
         rewards = own.rewards.tolist()
         ends = (own.terminated.item(), own.truncated.item()) if batch._over else (False, False)
         return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
     def _info(self) -> dict[str, Any]:
-        info, terms = super()._info(), self._own.terms
+        info, terms = self._common_info(), self._own.terms
         values = terms.copy() if terms.ndim == 2 else terms.tolist()
         for key, k in self._rewards:
             info[key] = values[k]

@@ -114,7 +114,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def _infos_of(self, agents: list[str]) -> _AgentInfos:
         """Return the infos of the last step or reset."""
-        common, rewards, infos = self._info(), self._rewards, {}
+        common, rewards, infos = self._common_info(), self._rewards, {}
         for agent, own in zip(agents, self._own.terms.T.tolist()):  # noqa: B905  equal lengths, in the hot path
             infos[agent] = info = common.copy()
             for key, k in rewards:  # faster than dict.update(zip(...)), which creates tuples

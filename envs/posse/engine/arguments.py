@@ -70,8 +70,8 @@ def real_numbers(
 
 def as_float32(name: str, value: object, shape: tuple[int, ...] | None = None) -> FloatArray:
     """Return :func:`real_numbers` as contiguous float32; numbers out of its range become infinite."""
-    if type(value) is np.ndarray and value.dtype is _FLOAT32 and value.shape == shape:
-        return np.ascontiguousarray(value)  # the usual case, which the checks would take as long as the rest
+    if type(value) is np.ndarray and value.dtype is _FLOAT32 and value.shape == shape and value.flags.c_contiguous:
+        return value  # the usual case, which the checks would take as long as the rest
     array = real_numbers(name, value, shape)
     with np.errstate(over="ignore"):
         return np.ascontiguousarray(array, np.float32)

@@ -22,7 +22,6 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
-    Orders,
     Results,
     direct,
     draw_anew,
@@ -368,12 +367,12 @@ class Batch(OwnArrays):
 
         Several threads share the worlds. Episodes that end are not started anew.
         """
-        fixed, given = self._fixed, Orders(self._orders if orders is None else orders, actions)
+        fixed, given = self._fixed, self._orders if orders is None else orders
         threads = len(fixed.scratch)
         if threads == 1:  # for one world, the other way takes a tenth longer
-            over = self._kernel(fixed, given, results, 0, 0, self.num_worlds)
+            over = self._kernel(fixed, given, actions, results, 0, 0, self.num_worlds)
         else:
-            arguments = fixed, given, results
+            arguments = fixed, given, actions, results
             over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:

@@ -53,15 +53,6 @@ class Fixed(NamedTuple):
     """(threads,) :data:`posse.rules.state.SCRATCH`."""
 
 
-class Orders(NamedTuple):
-    """What every world is to do."""
-
-    what: npt.NDArray[np.uint8]
-    """(E,) see :func:`advance_worlds`."""
-    actions: FloatArray
-    """(E, rows, 2 + m); control steps alone read them."""
-
-
 class Results(NamedTuple):
     """Outputs of a pass over the worlds."""
 
@@ -130,9 +121,16 @@ FETCHED: Final = 16
 
 @compiled
 def advance_worlds(
-    first: int, count: int, fixed: Fixed, orders: Orders, results: Results, made: Generated, scratch: Record
+    first: int,
+    count: int,
+    fixed: Fixed,
+    orders: npt.NDArray[np.uint8],
+    actions: FloatArray,
+    results: Results,
+    made: Generated,
+    scratch: Record,
 ) -> int:
-    """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
+    """Execute the orders (E,) of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
     STEP               a control step, or the start of the next episode if this one is over
@@ -141,7 +139,7 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH.
+    ``count`` is at most WIDTH. Control steps alone read ``actions`` (E, rows, 2 + m).
     """
     worlds, c, over = fixed.worlds, fixed.config[0], 0
     for e in range(first, first + count):
@@ -151,17 +149,17 @@ def advance_worlds(
             # Written below, after the loop; without prefetching 16,384 worlds take a third longer.
             for offset in range(0, observations.size * observations.itemsize, LINE):
                 fetch(observations, offset)
-        order = orders.what[e]
+        order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
         if order == STEP:
             apply_faults(c, w, trackers)
-            motion(c, worlds, e, orders.actions[e], made.set_goal, scratch)
+            motion(c, worlds, e, actions[e], made.set_goal, scratch)
             w.step += 1
             if c.drifts != 0:
                 drift(c, w, worlds.odometry[e])
-            keep_messages(c, w, trackers, orders.actions[e], worlds.message[e])
+            keep_messages(c, w, trackers, actions[e], worlds.message[e])
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles, made.draw_motion)
@@ -214,10 +212,18 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     made = generated_for(declarations)
 
     @kernel
-    def advance(fixed: Fixed, orders: Orders, results: Results, thread: int, first: int, end: int) -> int:
+    def advance(
+        fixed: Fixed,
+        orders: npt.NDArray[np.uint8],
+        actions: FloatArray,
+        results: Results,
+        thread: int,
+        first: int,
+        end: int,
+    ) -> int:
         scratch, over = fixed.scratch[thread], 0
         for e in range(first, end, WIDTH):
-            over += advance_worlds(e, min(WIDTH, end - e), fixed, orders, results, made, scratch)
+            over += advance_worlds(e, min(WIDTH, end - e), fixed, orders, actions, results, made, scratch)
         return over
 
     return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn
