@@ -159,7 +159,8 @@ def advance_worlds(
             w.step += 1
             if c.drifts != 0:
                 drift(c, w, worlds.odometry[e])
-            keep_messages(c, w, trackers, actions[e], worlds.message[e])
+            if c.message_size > 0:
+                keep_messages(c, w, trackers, actions[e], worlds.message[e])
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles, made.draw_motion)

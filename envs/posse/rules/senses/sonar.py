@@ -82,7 +82,10 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
             near &= near - 1
     if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    for k in range(c.sonar_beams):
+    whole = c.sonar_beams // WIDTH
+    for block in range(whole):
+        store(o, first + WIDTH * block, load(s.reading, WIDTH * block))
+    for k in range(WIDTH * whole, c.sonar_beams):
         o[first + k] = s.reading[k]
 
 
