@@ -20,10 +20,9 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Final, TypeVar, cast
 
+import llvmlite.binding as llvm
 import numba
 import numpy as np
-from llvmlite import __version__ as llvmlite_version
-from llvmlite import binding
 from numba.core import caching, codegen, compiler, serialize, types
 from numba.core.registry import CPUDispatcher
 
@@ -67,8 +66,7 @@ def kernel(function: F) -> F:
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).digest()
-_VERSIONS: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__)
-_BUILD: Final = (_SOURCES, _VERSIONS, _CONFIG.OPT, _CONFIG.BOUNDSCHECK)
+_VERSIONS: Final = sys.version, numba.__version__, llvm.llvm_version_info, np.__version__
 _PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
@@ -81,7 +79,7 @@ def stamp(*values: Any) -> str:
     globals and attributes of modules that they name, recursively.
     """
     _known.clear()
-    return _digest((_BUILD, values)).hex()
+    return _digest((_SOURCES, _VERSIONS, _CONFIG.OPT, _CONFIG.BOUNDSCHECK, values)).hex()
 
 
 def _digest(value: Any) -> bytes:
@@ -135,7 +133,7 @@ def _parts_of(function: FunctionType) -> tuple[Any, ...]:
         modules = (value for _, value in values if isinstance(value, ModuleType) and value not in places)
         places += (each for each in modules if each.__name__.partition(".")[0] not in ("numba", "numpy"))
         found += values
-    return function.__name__, code, function.__defaults__, function.__kwdefaults__, found
+    return function.__module__, function.__qualname__, code, function.__defaults__, function.__kwdefaults__, found
 
 
 class _Cache(caching.NullCache):
@@ -147,8 +145,7 @@ class _Cache(caching.NullCache):
     def _path(self, sig: Any, target: Any) -> Path:
         user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
         folder = Path(os.environ.get("POSSE_CACHE_DIR") or f"{user}/posse").expanduser().absolute()
-        f = self._function
-        return folder / f"{f.__name__}-{stamp(f, tuple(sig), f.__module__, f.__qualname__, target)}.kernel"
+        return folder / f"{self._function.__name__}-{stamp(self._function, tuple(sig), target)}.kernel"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with contextlib.suppress(Exception):  # what cannot be read is compiled
@@ -179,9 +176,9 @@ class _Library(codegen.JITCodeLibrary):
     """LLVM code of a kernel, in which no loop is unrolled or vectorised: most run a few times. Kernels gain 20 %."""
 
     def _optimize_final_module(self) -> None:
-        options = binding.create_pipeline_tuning_options(_CONFIG.OPT)
+        options = llvm.create_pipeline_tuning_options(_CONFIG.OPT)
         options.loop_unrolling = options.loop_vectorization = False
-        builder = binding.create_pass_builder(self._codegen._tm, options)
+        builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)
 
 
