@@ -13,8 +13,6 @@ from posse.declarations import unknown
 from posse.numeric import ONE, BoolArray, FloatArray, kernel
 from posse.scenarios import Scenario, ScenarioError
 
-MOST: Final = 2**63
-"""Seeds and numbers of worlds are below."""
 MOST_ACTION: Final = np.float32(1 + 1e-6)
 """Actions up to this are clipped to 1, since rounding may exceed it."""
 _FLOAT32: Final = np.dtype(np.float32)
@@ -22,7 +20,7 @@ _FLOAT32: Final = np.dtype(np.float32)
 
 def check_count(name: str, value: object, least: int) -> int:
     """Return a whole number in [least, 2**63), or raise ScenarioError."""
-    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not least <= value < MOST:
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not least <= value < 2**63:
         raise ScenarioError(f"{name}={reprlib.repr(value)} must be a whole number in [{least}, 2**63)")
     return int(value)
 

@@ -22,6 +22,7 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
+    Orders,
     Results,
     direct,
     draw_anew,
@@ -37,9 +38,7 @@ from posse.scenarios import Scenario, ScenarioError
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
 
-AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
-_FLOAT32: Final = np.dtype(np.float32)
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
 _DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_info"))
 
@@ -99,7 +98,7 @@ class Batch(OwnArrays):
         check_count("first_world + num_worlds - 1", self.first_world + self.num_worlds - 1, 0)
         self.seed = check_count("seed", seed, 0)
         self.split = check_choice("split", split, SPLITS)
-        self.autoreset = check_choice("autoreset mode", autoreset, AUTORESET_MODES)
+        self.autoreset = check_choice("autoreset mode", autoreset, ("next_step", "same_step", "disabled"))
         self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
@@ -362,17 +361,16 @@ class Batch(OwnArrays):
             infos["working"] = self.working
         return infos
 
-    def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
+    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
         """Advance every world by valid actions, or execute its order; return how many episodes are over.
 
         Several threads share the worlds. Episodes that end are not started anew.
         """
-        fixed, given = self._fixed, self._orders if orders is None else orders
-        threads = len(fixed.scratch)
+        arguments = self._fixed, self._orders if orders is None else orders, actions, results
+        threads = len(self._fixed.scratch)
         if threads == 1:  # for one world, the other way takes a tenth longer
-            over = self._kernel(fixed, given, actions, results, 0, 0, self.num_worlds)
+            over = self._kernel(*arguments, 0, 0, self.num_worlds)
         else:
-            arguments = fixed, given, actions, results
             over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
@@ -383,10 +381,10 @@ class Batch(OwnArrays):
         """Return output arrays for a pass over the worlds, uninitialised."""
         worlds, rows, _ = self.observation_shape
         return Results(
-            np.empty(self.observation_shape, _FLOAT32),
-            np.empty((worlds, rows), _FLOAT32),
-            np.empty((worlds, rows, len(self.term_names)), _FLOAT32),
-            np.empty(worlds, _FLOAT32),
+            np.empty(self.observation_shape, np.float32),
+            np.empty((worlds, rows), np.float32),
+            np.empty((worlds, rows, len(self.term_names)), np.float32),
+            np.empty(worlds, np.float32),
             np.empty(worlds, np.bool_),
             np.empty(worlds, np.bool_),
         )

@@ -36,6 +36,9 @@ from posse.signals.generate import generated_for
 from posse.signals.user_functions import check_functions
 from posse.signals.views import Generated, observe_together
 
+Orders = npt.NDArray[np.uint8]
+"""What every world is to do, (E,); see :func:`advance_worlds`."""
+
 
 class Fixed(NamedTuple):
     """What a batch passes to its kernel every time."""
@@ -113,24 +116,19 @@ START: Final = 1
 START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
-LINE: Final = 64
-"""Bytes of a cache line."""
-FETCHED: Final = 16
-"""Greatest team size whose prefetched data fit in the first-level cache."""
-
 
 @compiled
 def advance_worlds(
     first: int,
     count: int,
     fixed: Fixed,
-    orders: npt.NDArray[np.uint8],
+    orders: Orders,
     actions: FloatArray,
     results: Results,
     made: Generated,
     scratch: Record,
 ) -> int:
-    """Execute the orders (E,) of ``count`` worlds from ``first`` on; return how many are over.
+    """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
     STEP               a control step, or the start of the next episode if this one is over
@@ -139,15 +137,15 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH. Control steps alone read ``actions`` (E, rows, 2 + m).
+    ``count`` is at most WIDTH.
     """
     worlds, c, over = fixed.worlds, fixed.config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
-        if count > 1 and trackers.shape[0] <= FETCHED:
+        if count > 1 and trackers.shape[0] <= 16:  # larger teams' would not fit in the first-level cache
             # Written below, after the loop; without prefetching 16,384 worlds take a third longer.
-            for offset in range(0, observations.size * observations.itemsize, LINE):
+            for offset in range(0, observations.size * observations.itemsize, 64):  # bytes of a cache line
                 fetch(observations, offset)
         order = orders[e]
         if order == STEP and w.over != 0:
@@ -214,13 +212,7 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
 
     @kernel
     def advance(
-        fixed: Fixed,
-        orders: npt.NDArray[np.uint8],
-        actions: FloatArray,
-        results: Results,
-        thread: int,
-        first: int,
-        end: int,
+        fixed: Fixed, orders: Orders, actions: FloatArray, results: Results, thread: int, first: int, end: int
     ) -> int:
         scratch, over = fixed.scratch[thread], 0
         for e in range(first, end, WIDTH):
@@ -241,11 +233,6 @@ def direct(function: Callable[..., int]) -> Callable[..., int]:
     return forms[0].entry_point if len(forms) == 1 else function
 
 
-_COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes
-_SEED: Final = np.uint64(1)
-_POSITIVE: Final = np.uint64(2**63 - 1)
-
-
 @kernel
 def draw_anew(config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool) -> None:
     """Give copies, ``count`` consecutive ones per world, new keys, and redraw their faults."""
@@ -253,9 +240,9 @@ def draw_anew(config: Records, world: Records, tracker: Records, count: int, see
     for i in range(len(world)):
         w = world[i]
         number = np.uint64(0) if alike else np.uint64(i % count + 1)
-        key = mix(mix(mix(w.key, _COPIES), np.uint64(seed)), np.uint64(w.step))
-        w.key = mix(key, number)
-        w.seed = mix(w.key, _SEED) & _POSITIVE
+        copies = mix(w.key, np.uint64(0x636F70696573))  # other keys than those of episodes
+        w.key = mix(mix(mix(copies, np.uint64(seed)), np.uint64(w.step)), number)
+        w.seed = mix(w.key, np.uint64(1)) & np.uint64(2**63 - 1)
         draw_coming_faults(c, w, tracker[i], w.step + 1, w.step)
 
 

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from posse.engine.arguments import as_float32, in_box
 from posse.engine.batch import Batch
-from posse.engine.kernels import LOOK, Results
+from posse.engine.kernels import LOOK, Orders, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, get_scenario
 from posse.scenarios.family import scenario_or_family, shares
@@ -108,7 +107,7 @@ class PairedBatch(Batch):
             self.memory, self.everyone = before
             raise
 
-    def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
+    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
         """Advance every world by valid actions of this side and those of the policy inside.
 
         If the policy's actions are invalid, neither the worlds nor its memory change.
