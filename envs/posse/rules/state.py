@@ -247,18 +247,12 @@ _WORLD: Final = (
 )
 
 
-def world_record(scenario: Scenario) -> np.dtype[Any]:
-    """Return the record of one world.
-
-    It includes the memories of the target motions and the sums of the metrics, both of the built-in
-    ones and of those that the scenario names.
-    """
-    return world_record_of(Declarations.of(scenario))
-
-
 @functools.cache
-def world_record_of(declared: Declarations) -> np.dtype[Any]:
-    """Return the record of one world for declared motions and metrics; raise DeclarationError if a name is taken."""
+def world_record(declared: Declarations) -> np.dtype[Any]:
+    """Return the record of one world, with the memories of the declared motions and the sums of the metrics.
+
+    Raise DeclarationError if a memory has the name of another field.
+    """
     sums: dict[str, Any] = {metric.sum_name: np.float64 for metric in declared.metrics if metric.summed}
     fields = {**dict(_WORLD), **sums}
     for motion in declared.motions:
@@ -360,7 +354,7 @@ class WorldArrays(NamedTuple):
         ):
             tracker[limit], tracker[inverse] = values, 1 / np.array(values)
         return cls(
-            world=np.zeros(num_worlds, world_record(scenario)),
+            world=np.zeros(num_worlds, world_record(Declarations.of(scenario))),
             tracker=tracker,
             obstacle=np.zeros((num_worlds, scenario.num_obstacles), OBSTACLE),
             heard=np.zeros((num_worlds, kept, kept), HEARD),

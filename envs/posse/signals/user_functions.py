@@ -15,16 +15,11 @@ from numba.core import types
 from posse.declarations import Declarations, Function, parameters_of, plain
 from posse.numeric import UNCOMPILED
 from posse.numeric.lanes import LanesType, tuple_of_lanes
-from posse.rules.state import CONFIG, OBSTACLE, SCRATCH, SLOT, TRACKER, world_record_of
+from posse.rules.state import CONFIG, OBSTACLE, SCRATCH, SLOT, TRACKER, world_record
 from posse.signals.views import Mate, View
 
 _njit: Final[Any] = numba.njit  # Any: its types lack _nrt
 _typeof: Final[Any] = numba.typeof
-_COLOURS: Final = re.compile(r"\x1b\[[0-9;]*m")
-_RECORD: Final = re.compile(r"Record\(.*?;\d+;(?:True|False)\)", re.DOTALL)
-_VIEW: Final = re.compile(r"\b(View|Mate)\((?:Lanes|Mask)[^)]*\)")
-_UNKNOWN: Final = re.compile(r"Unknown attribute '(\w+)' of type")
-_HEADING: Final = "Failed in nopython mode"
 _LONGEST: Final = 200
 
 
@@ -33,7 +28,7 @@ def check_functions(declarations: Declarations) -> None:
     added = [each for group in declarations for each in group if not each.built_in]
     if UNCOMPILED or not added:
         return
-    records = {"c": CONFIG, "w": world_record_of(declarations), "t": TRACKER, "s": SCRATCH}
+    records = {"c": CONFIG, "w": world_record(declarations), "t": TRACKER, "s": SCRATCH}
     arrays = {"trackers": TRACKER, "obstacles": OBSTACLE, "slots": SLOT}
     known: dict[str, Any] = {
         **{name: _typeof(np.zeros(1, dtype)[0]) for name, dtype in records.items()},
@@ -58,8 +53,8 @@ def _why_not(function: Function, arguments: list[Any], returns: str) -> tuple[in
     try:
         alone.compile(tuple(arguments))
     except Exception as error:  # the compiler may raise anything
-        text = _COLOURS.sub("", str(error))
-        unknown = _UNKNOWN.search(text)
+        text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))  # without colours
+        unknown = re.search(r"Unknown attribute '(\w+)' of type", text)
         if unknown or isinstance(error, KeyError):  # an attribute of a view, or of a record
             name = unknown[1] if unknown else str(error.args[0])
             near = difflib.get_close_matches(name, {each for kind in arguments for each in getattr(kind, "fields", ())})
@@ -90,11 +85,12 @@ def _first_line(text: str) -> str:
     if "NRT required" in text:
         return "it creates an array, a list or a text, which compiled functions may not"
     lines = [line.strip() for line in text.splitlines()]
-    said = [line for line in lines if line and not line.startswith(_HEADING)] or ["it cannot be compiled"]
+    said = [line for line in lines if line and "Failed in nopython mode" not in line] or ["it cannot be compiled"]
     call = next((line[3:].strip() for line in said if line.startswith(">>>")), None)
     return said[0] if call is None else f"{call}: no such function of these types"
 
 
 def _short(text: str) -> str:
-    text = _VIEW.sub(r"\1", _RECORD.sub("a record", text))
+    text = re.sub(r"Record\(.*?;\d+;(?:True|False)\)", "a record", text, flags=re.DOTALL)
+    text = re.sub(r"\b(View|Mate)\((?:Lanes|Mask)[^)]*\)", r"\1", text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
