@@ -32,8 +32,6 @@ Bound = float | Callable[[Any], float]
 """A number, or a function of the scenario that returns one."""
 Decorator = Callable[[Function], Function]
 
-_PACKAGE: Final = __name__.partition(".")[0]
-
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> str:
     """Return the message for a name that is none of the known ones, with those most like it."""
@@ -135,7 +133,7 @@ class Declaration:
     @property
     def built_in(self) -> bool:
         """Whether posse itself declares it."""
-        return str(plain(self.function).__module__).partition(".")[0] == _PACKAGE
+        return str(plain(self.function).__module__).partition(".")[0] == "posse"
 
     def error(self, reason: str, function: Any = None) -> DeclarationError:
         """Return the error for an invalid declaration, or for one of its further functions."""

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from posse.rendering import style
-from posse.rendering.camera import Camera
+from posse.rendering.camera import Camera, Points
 from posse.rendering.canvas import Canvas
-from posse.rendering.scene import Floats, History, Scene
+from posse.rendering.scene import History, Scene
 
 _LEAST_RADIUS: Final = 5.0  # points, of a drawn robot
 _MOST_LINKED: Final = 12  # trackers
@@ -63,7 +63,7 @@ def sensing(d: Drawing) -> None:
         d.canvas.polygon(area, style.SENSING)
 
 
-def area_in_sight(scene: Scene, tracker: int) -> Floats:
+def area_in_sight(scene: Scene, tracker: int) -> Points:
     """Return the corners (K, 2) m of the area that a tracker's sensor covers, a ray for each degree.
 
     What lies behind an obstacle is not in sight.

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from posse.engine.batch import Batch
+from posse.rendering.camera import Points
 from posse.rendering.style import TRACKER, Colour
 from posse.rules.state import NEVER
-
-Floats = npt.NDArray[np.float64]
 
 _LINK_SHOWN: Final = 3  # control steps after a message
 _TRAIL_TIME: Final = 6.0  # s
@@ -35,7 +33,7 @@ class Scene:
         if colours is not None and len(colours) != n:
             raise ValueError(f"{len(colours)} colours do not fit {n} trackers: give one for each")
 
-        def points(*names: str) -> Floats:
+        def points(*names: str) -> Points:
             return np.stack([of[name] for name in names], axis=-1).astype(np.float64)
 
         self.scenario = s
@@ -66,7 +64,7 @@ class Scene:
         self.obstacles = points("obstacle_x", "obstacle_y", "obstacle_radius")  # (M, 3)
 
     @property
-    def action(self) -> Floats:
+    def action(self) -> Points:
         """Points (K, 2) that a camera keeps in view.
 
         Broken trackers stay behind: a view that included them would grow without bound.
@@ -93,14 +91,14 @@ class History:
         self._scenes = [*kept, scene]
         return scene.time - last.time
 
-    def trail(self) -> list[tuple[Floats, float]]:
+    def trail(self) -> list[tuple[Points, float]]:
         """Return past places (N + 1, 2) m, the target last, and freshness: 1 now, 0 at the end. Oldest first."""
         now = self._scenes[-1]
         every = max(1, round(_MARK_TIME / now.scenario.control_step))
         marks = [s for s in self._scenes if s.step % every == 0 or s is now]
         return [(np.vstack([s.position, s.target]), 1 - (now.time - s.time) / _TRAIL_TIME) for s in marks]
 
-    def flashes(self) -> list[tuple[Floats, float]]:
+    def flashes(self) -> list[tuple[Points, float]]:
         """Return place (2,) m and age, 0 now, 1 at the end, of the contacts that have just begun."""
         now = self._scenes[-1].time
         recent = [s for s in self._scenes if now - s.time < _FLASH_TIME]

@@ -70,14 +70,12 @@ class ObservationLayout:
     def check_added(self, observations: FloatArray) -> None:
         """Raise DeclarationError if a field that the scenario adds leaves its bounds in observations (..., F)."""
         views = self.views(observations)
-        for field in self.fields:
-            values = views[field.name]
-            if field.name in self.scenario.extra_fields and values.size:
-                low, high = np.float32(field.low), np.float32(field.high)
-                wrong = values[~((values >= low) & (values <= high))]
-                if wrong.size:
-                    where = f"from low={field.low:g} to high={field.high:g}"
-                    raise FIELDS[field.name].error(f"it returned {wrong.flat[0]:g}, which is not {where}")
+        for field in (field for field in self.fields if field.name in self.scenario.extra_fields):
+            values, low, high = views[field.name], np.float32(field.low), np.float32(field.high)
+            wrong = values[~((values >= low) & (values <= high))]
+            if wrong.size:
+                where = f"from low={field.low:g} to high={field.high:g}"
+                raise FIELDS[field.name].error(f"it returned {wrong.flat[0]:g}, which is not {where}")
 
     def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         """Return named views of flat observations (..., F), sharing their memory.
