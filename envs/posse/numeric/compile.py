@@ -101,18 +101,17 @@ class _Reached(pickle.Pickler):
             if type(value) is CPUDispatcher and _compiled_with.get(value) != _known[function]:
                 value.recompile()
                 _compiled_with[value] = _known[function]
-            return bytes, (_known[function],)
+            return repr, (_known[function],)
         if isinstance(value, CodeType):  # without places in its file
-            return tuple, ((value.co_code, value.co_consts, value.co_names, value.co_varnames, value.co_freevars),)
+            return repr, ((value.co_code, value.co_consts, value.co_names, value.co_varnames, value.co_freevars),)
         if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
-            return tuple, ((str(value), getattr(value, "instance_class", None), getattr(value, "types", ())),)
-        if isinstance(value, (ModuleType, type)) and value is not tuple:
-            inside = getattr(value, "_fields", ()), repr(getattr(value, "__members__", ""))
-            return tuple, ((value.__name__, *inside),)
+            return repr, ((str(value), value.key),)
+        if isinstance(value, (ModuleType, type)):
+            return repr, ((value.__name__, getattr(value, "_fields", ()), repr(getattr(value, "__members__", ""))),)
         try:
             pickle.dumps(value)
         except Exception:  # pickle may raise anything; such a value makes a kernel for this process alone
-            return tuple, ((_PROCESS, id(value)),)
+            return repr, ((_PROCESS, id(value)),)
         return NotImplemented
 
 
