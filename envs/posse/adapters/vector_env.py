@@ -19,7 +19,6 @@ from posse.scenarios import Family, Scenario
 from posse.scenarios.family import scenario_or_family, shares
 
 _Info = dict[str, Any]
-_Rewards = npt.NDArray[np.float64]
 
 DRAWN: Final = 16
 """Drawn scenarios of a family that are played side by side, where there are as many worlds."""
@@ -79,7 +78,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         infos = self._own([batch._infos_of(*zeros) for batch, zeros in zip(self.batches, nothing, strict=True)])
         return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
-    def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
+    def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, _Info]:
         """Advance every world by one control step; errors are those of :meth:`posse.Batch.step`."""
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
         motions = motions.reshape(self.num_envs, *self.batch.action_shape[1:])

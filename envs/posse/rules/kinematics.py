@@ -22,7 +22,7 @@ _C12: Final = np.float32(1 / 12)
 _C30: Final = np.float32(1 / 30)
 _C56: Final = np.float32(1 / 56)
 _SMALL: Final = np.float32(5e-7)  # up to this, tan(x) = x within rounding
-_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
+A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
@@ -79,7 +79,7 @@ def turn_towards(
     # of the greatest turn is at most limit / near_one.
     limit = most * time
     near_one = ONE - HALF * limit * limit
-    if near_one > ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:
+    if near_one > ZERO and abs(across) * near_one > A_LITTLE_MORE * limit * along:
         return np.float32(math.copysign(most, across))
     if abs(across) < _SMALL * along:
         error = np.float32(across / along)

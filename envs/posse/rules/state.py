@@ -66,10 +66,8 @@ def _share(time: float, constant: float) -> float:
 _Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
 
 DERIVED: Final[_Numbers] = {
-    "neighbours": (_I, lambda s: s.neighbours),
-    "physics_steps": (_I, lambda s: s.physics_steps),
+    **{name: (_I, attrgetter(name)) for name in ("neighbours", "physics_steps", "outage_steps", "walled", "drifts")},
     "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
-    "outage_steps": (_I, lambda s: s.outage_steps),
     "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
@@ -81,12 +79,10 @@ DERIVED: Final[_Numbers] = {
     "sensor": (_I, lambda s: SENSORS.with_added(s.sensor).index(SENSORS[s.sensor])),
     "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
     "measured": (_I, _measured),  # 0: sensors return the target's true position
-    "walled": (_I, lambda s: s.walled),
     "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
     "perfect_radio": (_I, perfect_radio),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
     "whole_arcs": (_I, _whole_arcs),
-    "drifts": (_I, lambda s: s.drifts),
     "position_step": (_F, lambda s: s.odometry_drift * math.sqrt(s.control_step)),
     "heading_step": (_F, lambda s: s.heading_drift * math.sqrt(s.control_step)),
     "followed": (_F, lambda s: _share(s.physics_step, s.actuator_lag)),

@@ -30,7 +30,6 @@ _FIXED: Final = {
     "num_neighbours": "on which the length of an observation depends",
     "message_size": "on which the length of an observation depends",
 }
-_MOST_CORNERS: Final = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +64,7 @@ class Family:
                 "team sizes of a family need num_neighbours, so that all observations have one length",
             )
         corners = itertools.product(*(dict.fromkeys(bounds) for _, bounds in self.ranges))
-        for values in itertools.islice(corners, _MOST_CORNERS):
+        for values in itertools.islice(corners, 1024):  # of many ranges, some
             self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
 
     @property

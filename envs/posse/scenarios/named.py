@@ -38,8 +38,6 @@ _WAFFLE_PI: Final[dict[str, Any]] = {
     "heading_noise": 0.05,  # 3°: a marker on the target, seen by a camera from some metres
 }
 
-_SHORTEST: Final = 1e-9  # s
-
 # The reasons for these settings are in docs/scenarios.md.
 SCENARIOS: Final[dict[str, dict[str, Any]]] = {
     "constant": {"meaning": "The target runs straight on; everybody sees it and hears everybody: a sanity check."},
@@ -166,6 +164,6 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     else:
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
     if "horizon" in overrides and "settle_time" not in overrides:
-        at_once = found.replace(settle_time=_SHORTEST, **overrides)
+        at_once = found.replace(settle_time=1e-9, **overrides)  # shorter than any episode
         return at_once.replace(settle_time=min(found.settle_time, at_once.duration))
     return found.replace(**overrides) if overrides else found

@@ -52,7 +52,6 @@ In float32 the squares of the sweep have an error of about 2^-22 d², and hence 
 discs of radius r one of 2^-22 d² / (4 r): 1.2e-4 m at most.
 """
 
-_DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 _WEIGHT: Final = ("1", -1e6, 1e6)  # terms are below 1e4, so sums stay far below 3e38
 
 
@@ -370,7 +369,7 @@ class Scenario:
                 for depth, row in enumerate(rows)
                 for column in range(len(row))
             ]
-        wing = spacing * _DIAGONAL
+        wing = spacing * math.sqrt(0.5)
         return [
             (-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(number)
         ]

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled, out_of_line
 from posse.numeric.lanes import bits, choose, eight, greater, lesser, load, lowest_bit, root, store
 from posse.rules.discs import FAR, blocks, num_discs, to_wall
-from posse.rules.kinematics import in_frame
-
-_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
+from posse.rules.kinematics import A_LITTLE_MORE, in_frame
 
 
 @compiled
@@ -72,7 +68,7 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
     for block in range(blocks(num_discs(c))):
         j = WIDTH * block
         dx, dy = load(s.x, j) - x, load(s.y, j) - y
-        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
+        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * A_LITTLE_MORE
         near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
         while near != 0:
             disc = j + lowest_bit(near)
