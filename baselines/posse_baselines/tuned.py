@@ -33,7 +33,7 @@ class TunedDDCS(DDCS):
         name: Its name; one of :data:`TUNED` if no settings are given.
         settings: Of the file; default: those that ship.
         card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
-            tuned for, and more.
+            tuned for, what was ``dropped`` since, and more.
     """
 
     trained_splits = ("train",)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import DDCS, PolicyError, load, play, policy_names
+from posse_baselines import DDCS, PolicyError, load, play, policy_names, tunables
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED, read_tuned, tuned_files
 from posse_training import evaluate
@@ -40,6 +40,7 @@ def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
     assert card["chosen_on"] == "validation"
     # "near" may raise "far", which has to exceed it.
     assert set(card["settings"]) - {"far", "range_far"} <= set(card["searched"])
+    assert set(card.get("dropped", ())).isdisjoint(tunable.name for tunable in tunables(FAMILY[TUNED[name]]))
     points = {point["generation"]: point["score"] for point in card["curve"]}
     assert points[card["generation"]] == max(points.values()) > points[0]
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card))

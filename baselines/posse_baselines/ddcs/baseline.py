@@ -48,13 +48,11 @@ BASELINE: Final = Settings(
     guidance="pngl",
     navigation_constant=1.1,  # K, at the upper end of the paper's range
     deviation="occupant",  # c = the heading of the slot's occupant - K σ_d, so that the leader holds its slot
-    turn_share=1.0,  # the slot frame turns at the target's full measured turn rate
     follower_law="l-phi",
     follower_frame="slot-frame",  # φ_d is constant in the slot frame, not in the leader's: the wedge stays behind
 )
 """The settings of PNGL + l-φ; the others keep their defaults (:class:`~posse_baselines.ddcs.settings.Settings`)."""
 
-_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl", "turn_share": 1.0}
 _CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame": "slot-frame"}
 
 FAMILY: Final[dict[str, Settings]] = {
@@ -62,10 +60,10 @@ FAMILY: Final[dict[str, Settings]] = {
     # As printed: c = 0, and φ from the leader's heading. The leader then follows from any side and the wedge turns with
     # it, so that only a target that drives straight ahead is held.
     "pngl-l-phi-literal": BASELINE.replace(deviation="none", follower_frame="leader"),
-    "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
-    "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),
-    "velocity-pursuit": Settings(deviation="none", **_PURSUIT),
-    "ddcs-centralized-pursuit": Settings(deviation="none", **_CENTRALIZED, **_PURSUIT),
+    "pngl": Settings(guidance="pngl", spread=0.1),
+    "deviated-pursuit": Settings(guidance="pngl"),
+    "velocity-pursuit": Settings(guidance="pngl", deviation="none"),
+    "ddcs-centralized-pursuit": Settings(guidance="pngl", deviation="none", **_CENTRALIZED),
     "ddcs-distributed": Settings(),
     "ddcs-centralized": Settings(**_CENTRALIZED),
     "ddcs-centralized-l-l": Settings(follower_law="l-l", **_CENTRALIZED),

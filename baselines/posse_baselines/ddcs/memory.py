@@ -158,7 +158,7 @@ MIND: Final = _record(
     fix_psi=_F(0),
     target_speed=_F(0),  # estimated speed, m/s
     target_turn=_F(0),  # estimated turn rate, rad/s
-    target_mean=_C(0),  # mean velocity
+    target_mean=_C(0),  # its mean velocity, m/s
     speed_known=_I(0),  # 1: the speed has been measured
     # the target, as it is taken to be now
     target=_C(0),  # position

@@ -25,6 +25,7 @@ _FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
 _JUMP: Final = 1.0  # m; a fix farther than this from the estimate replaces it
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
+_MEAN_MEMORY: Final = 6.0  # s; time constant of the target's mean velocity
 _LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
 _GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
 _UNSEEN_MEMORY: Final = 2.5  # s; timeout of team-mates that may have had no place in the observation
@@ -141,7 +142,9 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.world.outermost
     me.psi_limit = limit
     psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
-    turn = settings.turn_share * me.target_turn * math.exp(-me.fix_age / settings.turn_memory)
+    # A frame that has caught up with the target turns with it. Pursuit counts on that, and is exact on a circle; the
+    # slot law does not, which scores better against a target that weaves.
+    turn = me.target_turn * math.exp(-me.fix_age / settings.turn_memory) if settings.pngl else 0.0
     me.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
     me.frame = vector(1.0, psi)
 
@@ -151,20 +154,19 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
     """Blend a newer fix into the estimate."""
     at, settings = team.at, team.settings
     position = me.position + scaled(pair(row, at.target_bearing) * me.heading, row[at.target_range])
-    heading = pair(row, at.target_heading) * me.heading
-    theta, psi = angle_of(heading), angle_of(pair(row, at.target_frame) * me.heading)
+    theta = angle_of(pair(row, at.target_heading) * me.heading)
+    psi = angle_of(pair(row, at.target_frame) * me.heading)
     time = (fix_step - me.fix_step) * team.world.dt
     if me.fix_step < 0 or time > settings.target_lost_after:
         me.fix, me.target_turn = position, 0.0
         if me.speed_known == 0:
             me.target_speed = _UNKNOWN_SPEED * me.max_speed
-        me.target_mean = scaled(heading, me.target_speed)
+        me.target_mean = vector(me.target_speed, theta)
     else:
         # Both headings have the same noise, and of the slot frame it is known how fast it turns.
         psi_guess = me.fix_psi + clip(wrap(theta - psi), -me.psi_limit * time, me.psi_limit * time)
         noise = (1.0 - settings.heading_trust) * wrap(psi - psi_guess)
         theta, psi = wrap(theta - noise), wrap(psi - noise)
-        heading = heading * vector(1.0, -noise)
         guess, _ = target_after(team, me, time)
         turned = wrap(theta - me.fix_theta)
         me.target_turn = 0.0
@@ -176,8 +178,7 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
             me.speed_known = 1
         error = position - guess
         me.fix = guess + scaled(error, settings.fix_trust if length(error) <= _JUMP else 1.0)
-        share = 1.0 - math.exp(-time / settings.mean_memory)
-        me.target_mean += scaled(scaled(heading, me.target_speed) - me.target_mean, share)
+        me.target_mean += scaled(vector(me.target_speed, theta) - me.target_mean, 1.0 - math.exp(-time / _MEAN_MEMORY))
     me.raw, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
 
 

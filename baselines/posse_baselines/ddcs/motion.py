@@ -18,7 +18,6 @@ from typing import Final, NamedTuple
 
 from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, since
-from posse_baselines.ddcs.roles import course_of
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
 from posse_baselines.laws.exploration import push_from, push_inwards
@@ -27,6 +26,7 @@ from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled,
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
+_SOON: Final = 0.1  # s; a slot met sooner counts as met then
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 _LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, below which it is l-φ on the nearer robot
 
@@ -128,11 +128,16 @@ def hold_slot(team: Team, me: Record) -> None:
     """
     settings = team.settings
     arm = team.slots[me.slot] * me.frame + scaled(me.frame, settings.aim_ahead)
-    gain, clearance, rate = settings.gain, 0.0, settings.feed_forward * me.psi_rate
+    start, gain, clearance = me.position - me.target, settings.gain, 0.0
     if me.task == CONVERGING:
-        gain, clearance, rate = _FULL_SPEED, settings.clearance, 0.0
-    start, course = me.position - me.target, course_of(team, me)
-    want(me, steering.meeting_velocity(start, arm, course, clearance, gain, me.max_speed, me.acceleration), rate)
+        gain, clearance = _FULL_SPEED, settings.clearance
+    way = steering.way_round(start, arm, clearance) - start
+    # A far slot moves at the target's mean velocity: a target that weaves has turned back by then.
+    time = max(_SOON, steering.intercept_time(way, me.target_velocity, me.max_speed))
+    share = (1.0 - math.exp(-time / settings.weave_time)) * settings.weave_time / time
+    slot = scaled(steering.slot_velocity(me.target_velocity, me.psi_rate, arm), share)
+    slot += scaled(me.target_mean, 1.0 - share)
+    want(me, steering.approach_velocity(way, slot, gain, me.max_speed, me.acceleration), 0.0)
 
 
 @compiled

@@ -29,7 +29,7 @@ from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer
 from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
-from posse_baselines.laws.steering import Course, Work, assign, time_to_slot
+from posse_baselines.laws.steering import Work, assign, intercept_time
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
@@ -111,17 +111,11 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
 
 
 @compiled
-def course_of(team: Team, me: Record) -> Course:
-    """Return how the target is taken to move."""
-    return Course(me.target_velocity, me.target_mean, team.settings.weave_time, me.psi_rate)
-
-
-@compiled
 def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: int) -> float:
     """Return the time (s) that a tracker takes to slot k, less what the slot is worth."""
     settings, slot = team.settings, team.slots[k]
     way = me.target + slot * me.frame - position
-    time = time_to_slot(way, course_of(team, me), me.max_speed)
+    time = intercept_time(way, me.target_velocity, me.max_speed)
     # Time for turning towards it, up to half a turn.
     facing = dot(unit(way), heading)
     time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)

@@ -53,15 +53,10 @@ class Settings:
     # monitoring
     speed_memory: float = tuned(3.0, "s", 0.1, 10.0)
     """Time constant of the target's estimated speed."""
-    mean_memory: float = tuned(6.0, "s", 0.5, 20.0)
-    """Time constant of the target's mean velocity, used to intercept far slots."""
     weave_time: float = tuned(1.5, "s", 0.2, 10.0)
-    """Time for which the target's current velocity is extrapolated, before its mean one is used."""
+    """Time constant with which the target's velocity becomes its mean one, on the way to a far slot."""
     turn_memory: float = tuned(1.0, "s", 0.1, 5.0)
     """Decay time constant of a measured turn rate of the target."""
-    turn_share: float = tuned(0.0, "", 0.0, 1.0)
-    """Share of that turn rate in the slot frame's rate once the frame has caught up with it: 1 is
-    exact for a target on a circle, 0 scores better against one that weaves."""
     fix_trust: float = tuned(0.6, "", 0.05, 1.0)
     """Share of a new fix in the estimate of the position."""
     heading_trust: float = tuned(1.0, "", 0.02, 1.0)
@@ -113,9 +108,6 @@ class Settings:
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)
     """Gain of the slot law."""
-    feed_forward: float = tuned(0.0, "", 0.0, 1.0)
-    """Share of the slot frame's turn rate that the slot law adds to the turn command. 0 scores best
-    on every scenario by hand: a weaving target's rate has changed before the robot has turned."""
     aim_ahead: float = tuned(0.0, "m", -0.2, 0.3)
     """Offset ahead of a slot's centre, along the slot frame, at which the slot law aims."""
     detour: float = tuned(0.0, "m", 0.0, 1.0)

@@ -23,8 +23,6 @@ WORK_ROWS: Final = 7
 
 _SLOW: Final = 1e-2  # m/s; below it a slot's direction of motion is undefined
 _MIN_DISTANCE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
-_FARTHEST: Final = 20.0  # s; later interceptions are planned with this time
-_SOON: Final = 0.1  # s; before that only the current velocity counts
 _LEAST_TURN: Final = 0.6  # rad; least angle ahead on the circle for a tracker on or inside it
 _MOST_DISCS: Final = 32
 _BRAKING_SHARE: Final = 0.8  # of the greatest deceleration, which a planned approach uses
@@ -46,19 +44,6 @@ def work_for(num_trackers: int) -> Work:
     n, threads = num_trackers, MOST_THREADS
     cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
     return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))
-
-
-class Course(NamedTuple):
-    """How the target is taken to move."""
-
-    velocity: complex
-    """m/s, now."""
-    mean: complex
-    """m/s, over the last seconds; a weaving target moves on so."""
-    weave_time: float
-    """s. About how long the velocity is kept, before the mean one applies."""
-    frame_rate: float
-    """rad/s, of the slot frame."""
 
 
 @compiled
@@ -116,13 +101,6 @@ def intercept_time(way: complex, velocity: complex, max_speed: float) -> float:
 
 
 @compiled
-def time_to_slot(way: complex, course: Course, max_speed: float) -> float:
-    """Return the intercept time (s) of a slot that is ``way`` (m) off and moves as the target does."""
-    time = intercept_time(way, course.velocity, max_speed)
-    return intercept_time(way, course.mean, max_speed) if time > course.weave_time else time
-
-
-@compiled
 def way_round(start: complex, goal: complex, clearance: float) -> complex:
     """Return the next waypoint from one position to another around the origin (m).
 
@@ -137,25 +115,6 @@ def way_round(start: complex, goal: complex, clearance: float) -> complex:
     scale = clearance / max(length(start), 1e-6)
     angle = max(math.acos(min(1.0, scale)), _LEAST_TURN)
     return scaled(start * vector(1.0, -angle if crossing < 0.0 else angle), scale)
-
-
-@compiled
-def meeting_velocity(
-    start: complex, arm: complex, course: Course, clearance: float, gain: float, max_speed: float, deceleration: float
-) -> complex:
-    """Return the velocity (m/s) of an intercept course to a slot, around the target.
-
-    ``start`` (the tracker) and ``arm`` (the slot) are relative to the target, m. Far slots are predicted with the
-    target's mean velocity, near ones with its current one.
-    """
-    way = way_round(start, arm, clearance) - start
-    time = min(intercept_time(way, course.velocity, max_speed), _FARTHEST)
-    share = 1.0
-    if time > _SOON:
-        share = course.weave_time * (1.0 - math.exp(-time / course.weave_time)) / time
-    slot = slot_velocity(course.velocity, course.frame_rate, arm)
-    velocity = scaled(slot, share) + scaled(course.mean, 1.0 - share)
-    return approach_velocity(way, velocity, gain, max_speed, deceleration)
 
 
 @compiled

@@ -15,23 +15,20 @@ import numpy.typing as npt
 from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
-from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
+from posse_baselines.laws.geometry import angle_of, dot, length, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
 from posse_baselines.laws.steering import (
-    Course,
     Work,
     approach_velocity,
     assign,
-    meeting_velocity,
-    time_to_slot,
+    intercept_time,
+    slot_velocity,
     way_round,
     work_for,
 )
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
-_WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
-_MEAN_TIME: Final = 6.0  # s; time constant of that mean
 _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
 _TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 _CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
@@ -52,7 +49,6 @@ WAY: Final = record_type(
 
 PLAN: Final = record_type(
     ("slot", np.int32),  # -1: none yet
-    ("mean", np.complex64),  # running mean of the target's velocity, m/s; used only in the first record
     ("wish", np.complex64),  # the safe velocity that it was to have, m/s
     *((name, BODY[name]) for name in BODY.names or ()),
 )
@@ -127,12 +123,6 @@ def arm_of(scene: Scene, slot: int) -> complex:
 
 
 @compiled
-def course_of(scene: Scene) -> Course:
-    """Return how the target is taken to move."""
-    return Course(velocity_of(scene.world), scene.plans[0].mean, _WEAVE_TIME, scene.frame_rate)
-
-
-@compiled
 def foreseen(path: FloatArray, at: float, slot: complex) -> complex:
     """Return where a slot will be, m, ``at`` control steps along a path.
 
@@ -182,7 +172,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
                 time = arrival_time(scene, i, scene.teams.slots[k])
             else:
-                time = time_to_slot(way, course_of(scene), speed)
+                time = intercept_time(way, velocity_of(w), speed)
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
             time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
@@ -224,15 +214,18 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     dt, speed = scene.config.control_step, float(t.max_speed)
     arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
+    velocity, goal = (
+        slot_velocity(velocity_of(w), scene.frame_rate, arm + shift),
+        way_round(start, arm + shift, _CLEARANCE),
+    )
     if scene.since >= 0 and way.foresees > 0.0:
         time = arrival_time(scene, i, scene.teams.slots[slot])
         if time > _SOON:
-            goal = foreseen(scene.path, scene.since + time / dt, scene.teams.slots[slot])
-            moved = goal - complex(w.x, w.y) - arm
+            there = foreseen(scene.path, scene.since + time / dt, scene.teams.slots[slot])
+            moved = there - complex(w.x, w.y) - arm
             velocity = complex(moved.real / time, moved.imag / time)
-            offset = way_round(start, arm, _CLEARANCE) + shift - start
-            return approach_velocity(offset, velocity, way.gain, speed, acceleration)
-    return meeting_velocity(start, arm + shift, course_of(scene), _CLEARANCE, way.gain, speed, acceleration)
+            goal = way_round(start, arm, _CLEARANCE) + shift
+    return approach_velocity(goal - start, velocity, way.gain, speed, acceleration)
 
 
 @compiled
@@ -246,10 +239,8 @@ def frame_rate_of(c: Record, w: Record) -> float:
 @compiled
 def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
-    c, w, target = scene.config, scene.world, scene.plans[0]
-    share = min(1.0, float(c.control_step) / _MEAN_TIME) if w.step > 0 else 1.0
-    target.mean += scaled(velocity_of(w) - target.mean, share)
-    if w.step % _REPLAN_STEPS == 0 or target.slot < 0:
+    c, w = scene.config, scene.world
+    if w.step % _REPLAN_STEPS == 0 or scene.plans[0].slot < 0:
         assign_slots(scene, work)
     for i in range(c.num_trackers):
         t, me = scene.trackers[i], scene.plans[i]
