@@ -21,7 +21,6 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
     network = Network(
         mean=draw(inputs),
         scale=np.abs(draw(inputs)),
-        limit=5.0,
         weights=tuple(draw(b, a) / np.float32(a**0.5) for a, b in itertools.pairwise(sizes)),
         biases=tuple(draw(b) for b in sizes[1:]),
         activation="tanh",

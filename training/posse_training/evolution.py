@@ -26,6 +26,7 @@ from posse_baselines import batch_for, load, rollout
 from posse_baselines.files import read_json, write_json
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
+from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_training.errors import require
 from posse_training.files import hold_settings, intact
@@ -33,7 +34,6 @@ from posse_training.provenance import software
 from posse_training.train.checkpoint import write_curve
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
-from posse_training.train.networks import LIMIT
 from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
 from posse_training.train.validation import validate
 from posse_training.train.worlds import divided
@@ -119,7 +119,7 @@ class Candidates(LearnedPolicy):
     def __init__(self, settings: TrainSettings, weights: FloatArray, card: dict[str, Any]) -> None:
         self._settings, self._weights = settings, weights
         zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
-        network = Network(zeros, ones, LIMIT, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
+        network = Network(zeros, ones, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
         encoding = Encoding(settings.encoding, 0, ())
         adviser = None if settings.advise is None else load(settings.advise)
         super().__init__(network, encoding, card, adviser, settings.safeguard)

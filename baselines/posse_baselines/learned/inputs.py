@@ -9,7 +9,6 @@ ones are filled with the field's value for "unknown". An :class:`Encoder` applie
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -94,15 +93,6 @@ class Encoding:
     def num_features(self) -> int:
         """Number of features, which precede the observation."""
         return NUM_FEATURES if self.kind == "features" else 0
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
-        """Return the encoding of the values that ``dataclasses.asdict`` gives."""
-        fields = tuple(
-            EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
-            for name, size, unit, unknown, of_neighbour in values["fields"]
-        )
-        return cls(str(values["kind"]), int(values["neighbours"]), fields)
 
     def _in_order(self) -> list[tuple[EncodedField, int]]:
         """Return the fields in the order in which they are read, those of a team-mate with its place."""

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from posse.numeric import MOST_THREADS, ONE, ZERO, FloatArray, OwnArrays, compiled, kernel, over_worlds
 from posse_baselines.policy import PolicyError
 
+LIMIT: Final = np.float32(10.0)
+"""Largest absolute value of a normalised input."""
 ACTIVATIONS: Final = ("tanh", "relu")
 OUTPUTS: Final = ("clip", "tanh")
 """Functions that bring the output into [-1, 1]."""
@@ -22,7 +24,7 @@ OUTPUTS: Final = ("clip", "tanh")
 class Network(OwnArrays):
     """A network with its input normalisation, all float32.
 
-    x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
+    x = clip((input - mean) * scale, ±LIMIT), then layers of weight (out, in) and bias (out,) with
     the activation between them; ``output`` brings the result into [-1, 1].
 
     Raises:
@@ -31,7 +33,6 @@ class Network(OwnArrays):
 
     mean: FloatArray
     scale: FloatArray
-    limit: float
     weights: tuple[FloatArray, ...]
     biases: tuple[FloatArray, ...]
     activation: str
@@ -54,8 +55,6 @@ class Network(OwnArrays):
                 raise PolicyError(f"{name} has shape {array.shape}, not {wanted[name]}: layers must follow one another")
             if array.dtype != np.float32 or not np.isfinite(array).all():
                 raise PolicyError("a network's numbers must be finite float32")
-        if not 0 < self.limit < math.inf:
-            raise PolicyError(f"limit={self.limit} of the normalised inputs must be a finite number above 0")
 
     @property
     def inputs(self) -> int:
@@ -80,7 +79,6 @@ class Network(OwnArrays):
         return Flat(
             np.ascontiguousarray(self.mean),
             np.ascontiguousarray(self.scale),
-            np.float32(self.limit),
             np.array([self.inputs, *map(len, self.weights)], np.int64),
             np.concatenate([weight.T.reshape(-1) for weight in self.weights]),
             np.concatenate(self.biases),
@@ -94,7 +92,6 @@ class Flat(NamedTuple):
 
     mean: FloatArray
     scale: FloatArray
-    limit: np.float32
     sizes: npt.NDArray[np.int64]
     """Numbers that the first layer reads, and that each layer computes."""
     weights: FloatArray
@@ -125,7 +122,7 @@ def _forward_rows(
         x, y = scratch[thread, 0], scratch[thread, 1]
         for k in range(sizes[0]):
             normalised = (inputs[r, k] - network.mean[k]) * network.scale[k]
-            x[k] = min(max(normalised, -network.limit), network.limit)
+            x[k] = min(max(normalised, -LIMIT), LIMIT)
         at_weight, at_bias = 0, 0
         for layer in range(len(sizes) - 1):
             size, count = sizes[layer], sizes[layer + 1]

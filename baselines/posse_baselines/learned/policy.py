@@ -24,7 +24,7 @@ from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.ddcs import DDCS
 from posse_baselines.files import write_atomically
-from posse_baselines.learned.inputs import Encoder, Encoding
+from posse_baselines.learned.inputs import EncodedField, Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
@@ -161,7 +161,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """Return what its file says beside the tensors, as plain values."""
         return {
             "format": FORMAT,
-            **{name: getattr(self.network, name) for name in ("limit", "activation", "output")},
+            **{name: getattr(self.network, name) for name in ("activation", "output")},
             "encoding": asdict(self.encoding),
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
@@ -189,7 +189,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             network = Network(
                 mean=tensors["normaliser.mean"],
                 scale=tensors["normaliser.scale"],
-                limit=float(description["limit"]),
                 weights=tuple(tensors[f"layers.{k}.weight"] for k in range(count)),
                 biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
                 activation=str(description["activation"]),
@@ -198,9 +197,14 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             adviser = description["adviser"]  # a scripted policy of this package: a file never names other code
             if adviser is not None and adviser not in SCRIPTED:
                 raise PolicyError(f"{unknown('adviser', adviser, SCRIPTED)}: install the version that wrote it")
+            read = description["encoding"]
+            fields = tuple(
+                EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
+                for name, size, unit, unknown, of_neighbour in read["fields"]
+            )
             return cls(
                 network,
-                Encoding.from_dict(description["encoding"]),
+                Encoding(str(read["kind"]), int(read["neighbours"]), fields),
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
                 bool(description["safeguard"]),

@@ -109,7 +109,6 @@ LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, 
     ("changes", "message"),
     [
         ({"format": 2}, "its format is 2, this version reads 1"),
-        ({"limit": float("nan")}, "limit=nan"),
         ({"activation": "x" * 5000}, "unknown activation"),
         ({"adviser": "os:system"}, "unknown adviser 'os:system'"),
         ({"adviser": "planner"}, "cannot be an adviser"),

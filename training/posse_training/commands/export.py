@@ -13,6 +13,7 @@ import tyro
 
 from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_training.errors import SettingsError, require
@@ -45,7 +46,7 @@ def export(policy: LearnedPolicy, out: str | Path) -> None:
     network, named, nodes = policy.network, columns(policy), []
     tensor = helper.make_tensor_value_info
     *inputs, output = [tensor(name, TensorProto.FLOAT, ["robots", len(names)]) for name, names in named.items()]
-    bounds = {"lower": -network.limit, "upper": network.limit, "minus_one": -1.0, "one": 1.0}
+    bounds = {"lower": -LIMIT, "upper": LIMIT, "minus_one": -1.0, "one": 1.0}
     constants = network.tensors() | {name: np.array(value, np.float32) for name, value in bounds.items()}
 
     def add(operator: str, *of: str, to: str, **attributes: int) -> str:

@@ -15,7 +15,7 @@ from torch import nn
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.provenance import commit, software
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.networks import LIMIT, Normaliser
+from posse_training.train.networks import Normaliser
 from posse_training.train.settings import TrainSettings
 
 
@@ -38,7 +38,6 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
     network = Network(
         mean=_numbers(normaliser.mean)[:inputs],
         scale=_numbers(normaliser.scale)[:inputs],
-        limit=LIMIT,
         weights=tuple(_numbers(layer.weight) for layer in layers),
         biases=tuple(_numbers(layer.bias) for layer in layers),
         activation=settings.activation,

@@ -13,8 +13,8 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_mlp
 from torch import nn
 
-LIMIT: Final = 10.0
-"""Largest absolute value of a normalised input."""
+from posse_baselines.learned.network import LIMIT
+
 _LEAST_DEVIATION: Final = 1e-3
 _REMEMBERED: Final = 2_000_000.0
 """Largest count: from there on, new rows weigh more than old ones."""
@@ -39,7 +39,7 @@ class Normaliser(BaseFeaturesExtractor):
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Return the normalised observations, of the same shape."""
-        return (observations - self.mean).mul_(self.scale).clamp_(-LIMIT, LIMIT)
+        return (observations - self.mean).mul_(self.scale).clamp_(-float(LIMIT), float(LIMIT))
 
 
 class RunningStatistics(RunningMeanStd):
