@@ -46,13 +46,13 @@ def unit_of(scenario: Scenario) -> float:
     return scenario.robot_radius / _RADIUS
 
 
-def _record(**values: Any) -> Records:
+def record(**values: Any) -> Records:
     """Return an array of one record that has these values, in their types."""
     arrays = {name: np.asarray(value) for name, value in values.items()}
-    record = np.zeros(1, record_type(*((name, array.dtype, array.shape) for name, array in arrays.items())))
+    found = np.zeros(1, record_type(*((name, array.dtype, array.shape) for name, array in arrays.items())))
     for name, array in arrays.items():
-        record[name] = array
-    return record
+        found[name] = array
+    return found
 
 
 def offsets_of(layout: ObservationLayout) -> Records:
@@ -63,7 +63,7 @@ def offsets_of(layout: ObservationLayout) -> Records:
     at = {name: layout.offsets.get(name, -1) for name in _FIELDS}
     at |= {"neighbours": layout.neighbours, "stride": layout.stride}
     at |= {name: getattr(layout.scenario, name) for name in ("sonar_beams", "message_size")}
-    return _record(**{name: _I(value) for name, value in at.items()})
+    return record(**{name: _I(value) for name, value in at.items()})
 
 
 def constants_of(scenario: Scenario, settings: Settings) -> Records:
@@ -73,7 +73,7 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
     delay = scenario.command_delay if foreseen else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
     sight = min(scenario.sensing_range / unit, _MOST_SIGHT)
-    return _record(
+    return record(
         dt=dt,  # control step, s
         delay=_I(delay),  # control steps after which a command is executed
         lead=delay * float(dt),  # the same in s: how far decisions are ahead of the observation
@@ -114,7 +114,7 @@ def settings_of(settings: Settings) -> Records:
         before, after = transition.split(">")
         forbidden[TASKS.index(before), TASKS.index(after)] = 1
     values = dataclasses.asdict(settings)
-    return _record(
+    return record(
         forbidden=forbidden,
         centralized=settings.model == "centralized",
         pngl=settings.guidance == "pngl",
@@ -144,7 +144,7 @@ class Team(NamedTuple):
 # --- memory --------------------------------------------------------------------------------------
 
 
-MIND: Final = _record(
+MIND: Final = record(
     step=_I(0),  # control steps since the episode began
     # this robot, from the observation of this step; heading, motion and limits are those of BODY
     number=_I(0),
@@ -199,7 +199,7 @@ MIND: Final = _record(
 )
 """Memory of one tracker at the start of an episode, an array of one record."""
 
-MATE: Final = _record(
+MATE: Final = record(
     step=_I(-1),  # own step at which it sent what follows; -1: never heard
     heard=_I(-1),  # own step at which it was heard last
     position=_C(0),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner_law import PLAN_AT_START, WAY, Teams, drive, teams_of
+from posse_baselines.policies.planner_law import PLAN, WAY, Teams, drive, teams_of
 from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
@@ -86,7 +86,7 @@ class Search(OwnArrays):
     def restart(self, mask: BoolArray) -> None:
         """Forget what was planned for the worlds of a mask (E,)."""
         self.teams.ways[mask] = _STANDARD[0]
-        self.teams.plans[mask] = PLAN_AT_START
+        self.teams.plans[mask] = PLAN
         self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
+from posse_baselines.ddcs.memory import record
 from posse_baselines.laws.geometry import angle_of, dot, length, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
@@ -47,14 +48,12 @@ WAY: Final = record_type(
 )
 """How one tracker plays."""
 
-PLAN: Final = record_type(
-    ("slot", np.int32),  # -1: none yet
-    ("wish", np.complex64),  # the safe velocity that it was to have, m/s
-    *((name, BODY[name]) for name in BODY.names or ()),
+PLAN: Final = record(
+    slot=np.int32(-1),  # -1: none yet
+    wish=np.complex64(0),  # the safe velocity that it was to have, m/s
+    **{name: BODY[name].type(0) for name in BODY.names or ()},
 )
-"""Memory of one tracker, and its motion."""
-PLAN_AT_START: Final = np.zeros((), PLAN)
-PLAN_AT_START["slot"] = -1
+"""Memory of one tracker at the start, and its motion, an array of one record."""
 
 
 class Teams(NamedTuple):
@@ -99,7 +98,7 @@ def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
     """Return teams that play ways (E, N) and have no slots yet and no path foreseen, of up to so many positions."""
     num_worlds, n = ways.shape
     paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
-    plans, late = np.full(ways.shape, PLAN_AT_START), np.zeros(n, np.float32)
+    plans, late = np.full(ways.shape, PLAN), np.zeros(n, np.float32)
     slots = np.array([complex(slot.x, slot.y) for slot in slot_records(scenario)], np.complex64)
     return Teams(config_record(scenario), slots, ways, plans, late, paths, begun, work_for(n))
 
@@ -214,10 +213,8 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     dt, speed = scene.config.control_step, float(t.max_speed)
     arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
-    velocity, goal = (
-        slot_velocity(velocity_of(w), scene.frame_rate, arm + shift),
-        way_round(start, arm + shift, _CLEARANCE),
-    )
+    goal = way_round(start, arm + shift, _CLEARANCE)
+    velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
     if scene.since >= 0 and way.foresees > 0.0:
         time = arrival_time(scene, i, scene.teams.slots[slot])
         if time > _SOON:
