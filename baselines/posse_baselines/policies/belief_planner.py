@@ -134,7 +134,7 @@ class Beliefs(OwnArrays):
     def act(self, observations: FloatArray, working: BoolArray) -> FloatArray:
         """Bring the worlds up to the present; return the action of each tracker in its own, (R, 2).
 
-        ``working`` (R, N): which trackers count as such. Observations are (E, N, F).
+        ``working`` (R, N): which trackers each one takes to work and to be in range. Observations are (E, N, F).
         """
         worlds = self.now.arrays
         worlds.write(self._past)
@@ -321,7 +321,9 @@ class BeliefPlanner(DDCS):
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
-        actions = beliefs.act(np.asarray(observations, np.float32), self._working(memory)).reshape(*shape, 2)
+        working = (mates["there"] != 0) | (np.arange(mates.shape[-1]) == me["number"][..., None])
+        actions = beliefs.act(np.asarray(observations, np.float32), working.reshape(-1, mates.shape[-1]))
+        actions = actions.reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.
@@ -349,9 +351,3 @@ class BeliefPlanner(DDCS):
         """Return whether each tracker plays what it planned, (E, N)."""
         beliefs = memory.beliefs
         return np.asarray(beliefs.age.reshape(memory.me.shape) * beliefs.dt <= _LOST_AFTER)
-
-    def _working(self, minds: Minds) -> BoolArray:
-        """Return which trackers each one takes to work and to be in range, (R, N)."""
-        mates = minds.mates["there"] != 0
-        mates |= np.arange(mates.shape[-1]) == minds.me["number"][..., None]
-        return np.asarray(mates.reshape(-1, mates.shape[-1]))

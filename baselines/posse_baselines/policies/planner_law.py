@@ -115,10 +115,9 @@ def velocity_of(r: Record) -> complex:
 
 
 @compiled
-def arm_of(scene: Scene, slot: int) -> complex:
+def arm_of(scene: Scene, slot: complex) -> complex:
     """Return where a slot is from the target, m."""
-    place: complex = scene.teams.slots[slot]
-    return place * complex(scene.world.frame_cos, scene.world.frame_sin)
+    return slot * complex(scene.world.frame_cos, scene.world.frame_sin)
 
 
 @compiled
@@ -165,13 +164,13 @@ def assign_slots(scene: Scene, work: Work) -> None:
         t = scene.trackers[i]
         if t.broken_at != NEVER:
             continue
-        speed = float(t.max_speed)
         for k in range(n):
-            way = complex(w.x, w.y) + arm_of(scene, k) - complex(t.x, t.y)
+            slot = scene.teams.slots[k]
+            way = complex(w.x, w.y) + arm_of(scene, slot) - complex(t.x, t.y)
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene, i, scene.teams.slots[k])
+                time = arrival_time(scene, i, slot)
             else:
-                time = intercept_time(way, velocity_of(w), speed)
+                time = intercept_time(way, velocity_of(w), float(t.max_speed))
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
             time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
@@ -209,20 +208,19 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
 @compiled
 def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
-    w, t, way, slot = scene.world, scene.trackers[i], scene.ways[i], scene.plans[i].slot
-    dt, speed = scene.config.control_step, float(t.max_speed)
-    arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
+    w, t, way, place = scene.world, scene.trackers[i], scene.ways[i], scene.teams.slots[scene.plans[i].slot]
+    arm, start = arm_of(scene, place), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     goal = way_round(start, arm + shift, _CLEARANCE)
     velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene, i, scene.teams.slots[slot])
+        time = arrival_time(scene, i, place)
         if time > _SOON:
-            there = foreseen(scene.path, scene.since + time / dt, scene.teams.slots[slot])
+            there = foreseen(scene.path, scene.since + time / scene.config.control_step, place)
             moved = there - complex(w.x, w.y) - arm
             velocity = complex(moved.real / time, moved.imag / time)
             goal = way_round(start, arm, _CLEARANCE) + shift
-    return approach_velocity(goal - start, velocity, way.gain, speed, acceleration)
+    return approach_velocity(goal - start, velocity, way.gain, float(t.max_speed), acceleration)
 
 
 @compiled
