@@ -34,8 +34,8 @@ import numpy as np
 from posse import ObservationLayout, Scenario
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
-from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, read_body, unit_of
-from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, place_mates, update_mates, watch_target, write_message
+from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, unit_of
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, place_mates, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
@@ -144,14 +144,6 @@ class DDCS(BasePolicy):
         notes["estimate"] = np.stack([me["target"].real * unit, me["target"].imag * unit, me["target_theta"]], axis=-1)
         notes["estimate_age"] = np.where(me["known"] != 0, me["fix_age"], np.float32(-1.0))
         return notes
-
-
-@compiled
-def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
-    """Read what one tracker observes."""
-    read_body(team, me, row)
-    watch_target(team, me, row)
-    update_mates(team, me, mates, row)
 
 
 @compiled

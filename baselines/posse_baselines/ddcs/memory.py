@@ -23,7 +23,7 @@ from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, com
 from posse.rules import beam_directions
 from posse.scenarios.scenario import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import TASKS, Settings
-from posse_baselines.laws.guidance import BODY, UNLIMITED
+from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.steering import Work, work_for
 
 Kernel = Callable[..., None]
@@ -149,7 +149,7 @@ MIND: Final = record(
     # this robot, from the observation of this step; heading, motion and limits are those of BODY
     number=_I(0),
     position=np.complex128(0),
-    **{name: BODY[name].type(0) for name in BODY.names or ()},
+    **BODY,
     # the target, as it was at the newest fix
     fix_step=_I(-1),  # own step of that fix; -1: none yet
     fix=_C(0),  # estimated position
@@ -304,19 +304,3 @@ def is_due(team: Team, me: Record, period: float) -> bool:
 def since(team: Team, me: Record, step: int) -> float:
     """Return the time (s) since an own step."""
     return float((me.step - step) * team.world.dt)
-
-
-@compiled
-def read_body(team: Team, me: Record, row: FloatArray) -> None:
-    """Read the robot's number, pose, motion and limits from its observation (F,), once a step."""
-    at = team.at
-    me.number = int(row[at.number])
-    me.position, me.heading = pair(row, at.position), pair(row, at.heading)
-    me.speed, me.omega = row[at.speed], row[at.turn_rate]
-    me.max_speed, me.max_omega = row[at.max_speed], row[at.max_turn_rate]
-    me.acceleration, me.turn_acceleration = UNLIMITED, UNLIMITED
-    if row[at.acceleration_time] > 0.0:
-        me.acceleration = row[at.max_speed] / row[at.acceleration_time]
-    if row[at.turn_acceleration_time] > 0.0:
-        me.turn_acceleration = row[at.max_turn_rate] / row[at.turn_acceleration_time]
-    me.dt = team.world.dt

@@ -13,6 +13,7 @@ from typing import Final
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, pair, since
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, vector, wrap
+from posse_baselines.laws.guidance import UNLIMITED
 
 MESSAGE_SIZE: Final = 5
 """Task, leader, term, pulse, slot: five small whole numbers; where poses drift, with the target as seen beside them."""
@@ -101,6 +102,30 @@ def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None
     turned = vector(1.0, mate.twist)
     mate.position += mate.shift
     mate.heading, mate.velocity = mate.heading * turned, mate.velocity * turned
+
+
+@compiled
+def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
+    """Read what one tracker observes (F,): itself, the target, its team-mates."""
+    read_body(team, me, row)
+    watch_target(team, me, row)
+    update_mates(team, me, mates, row)
+
+
+@compiled
+def read_body(team: Team, me: Record, row: FloatArray) -> None:
+    """Read the robot's number, pose, motion and limits from its observation (F,), once a step."""
+    at = team.at
+    me.number = int(row[at.number])
+    me.position, me.heading = pair(row, at.position), pair(row, at.heading)
+    me.speed, me.omega = row[at.speed], row[at.turn_rate]
+    me.max_speed, me.max_omega = row[at.max_speed], row[at.max_turn_rate]
+    me.acceleration, me.turn_acceleration = UNLIMITED, UNLIMITED
+    if row[at.acceleration_time] > 0.0:
+        me.acceleration = row[at.max_speed] / row[at.acceleration_time]
+    if row[at.turn_acceleration_time] > 0.0:
+        me.turn_acceleration = row[at.max_turn_rate] / row[at.turn_acceleration_time]
+    me.dt = team.world.dt
 
 
 @compiled

@@ -32,11 +32,11 @@ one that does not obey the law yet is turned by the shorter turn, at the limit. 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, compiled, record_type
+from posse.numeric import FloatArray, Record, compiled
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, wrap
 
 MIN_COSINE: Final = 0.6
@@ -48,17 +48,17 @@ _STANDSTILL: Final = 1e-3  # m/s
 
 UNLIMITED: Final = 1e4
 """m/s² or rad/s². What stands for no limit."""
-BODY: Final = record_type(
-    ("heading", np.complex128),
-    ("speed", np.float64),  # m/s
-    ("omega", np.float64),  # turn rate, rad/s
-    ("max_speed", np.float64),
-    ("max_omega", np.float64),
-    ("acceleration", np.float64),  # greatest change of the speed, m/s²
-    ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
-    ("dt", np.float64),  # control step, s
-)
-"""A robot's present motion and its limits."""
+BODY: Final[dict[str, Any]] = {
+    "heading": np.complex128(0),
+    "speed": 0.0,  # m/s
+    "omega": 0.0,  # turn rate, rad/s
+    "max_speed": 0.0,
+    "max_omega": 0.0,
+    "acceleration": 0.0,  # greatest change of the speed, m/s²
+    "turn_acceleration": 0.0,  # greatest change of the turn rate, rad/s²
+    "dt": 0.0,  # control step, s
+}
+"""A robot's present motion and its limits: fields, with their types, of a record that laws take as ``body``."""
 
 
 @compiled

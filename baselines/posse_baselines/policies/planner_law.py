@@ -51,7 +51,7 @@ WAY: Final = record_type(
 PLAN: Final = record(
     slot=np.int32(-1),  # -1: none yet
     wish=np.complex64(0),  # the safe velocity that it was to have, m/s
-    **{name: BODY[name].type(0) for name in BODY.names or ()},
+    **BODY,
 )
 """Memory of one tracker at the start, and its motion, an array of one record."""
 

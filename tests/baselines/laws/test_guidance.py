@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tests.support.reference.motion import on_arc
 
+from posse_baselines.ddcs.memory import record
 from posse_baselines.laws import formation, guidance
 from posse_baselines.laws.formation import Demand
 from posse_baselines.laws.geometry import wrap
@@ -116,7 +117,7 @@ def test_speed_stays_within_the_limits() -> None:
 
 def body_of(theta: float = 0.0, speed: float = 0.0, limits: tuple[float, float] = (1e4, 1e4), dt: float = 0.1) -> Any:
     """A robot of up to 1 m/s and 2 rad/s, and limits of its acceleration and turn acceleration."""
-    body = np.zeros(1, BODY)[0]
+    body = record(**BODY)[0]
     body.heading, body.speed = cmath.rect(1.0, theta), speed
     body.max_speed, body.max_omega, body.dt = 1.0, 2.0, dt
     body.acceleration, body.turn_acceleration = limits
