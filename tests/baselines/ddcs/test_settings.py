@@ -45,11 +45,6 @@ def test_both_ends_of_each_range_can_be_played() -> None:
         assert np.isfinite(play(batch, DDCS(FAMILY["pngl-l-phi"]).with_settings(**values))["score"]).all()
 
 
-def test_an_unknown_setting_is_refused() -> None:
-    with pytest.raises(TypeError, match="gian"):
-        DDCS(FAMILY["pngl"]).with_settings(gian=1.0)
-
-
 @pytest.mark.parametrize("scenario", ["smart", "field"])
 @pytest.mark.parametrize("name", ["pngl-l-phi", "ddcs-distributed"])
 def test_small_robots_do_in_a_small_world_what_large_ones_do_in_a_large_one(scenario: str, name: str) -> None:
