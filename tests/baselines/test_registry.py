@@ -104,7 +104,6 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
         ("agent", "unknown target 'agent'"),
         (__file__, "not a policy file"),
         ("posse_baselines:load", "lacks begin, act, restart"),
-        ("a\0b", "unknown target"),
     ],
 )
 def test_an_unknown_target_is_refused(text: str, message: str) -> None:
