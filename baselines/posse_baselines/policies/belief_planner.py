@@ -131,10 +131,11 @@ class Beliefs(OwnArrays):
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
 
-    def act(self, observations: FloatArray, working: BoolArray) -> FloatArray:
+    def act(self, observations: FloatArray, working: BoolArray, mates: Records) -> FloatArray:
         """Bring the worlds up to the present; return the action of each tracker in its own, (R, 2).
 
-        ``working`` (R, N): which trackers each one takes to work and to be in range. Observations are (E, N, F).
+        ``working`` (R, N): which trackers each one takes to work and to be in range; ``mates`` (R, N): what it knows of
+        them. Observations are (E, N, F).
         """
         worlds = self.now.arrays
         worlds.write(self._past)
@@ -143,7 +144,7 @@ class Beliefs(OwnArrays):
         self._past.write(worlds)
         for array in self._told:
             array[:-1], array[-1] = array[1:], 0
-        own = self._listen(observations)
+        own = self._listen(observations, mates)
         seen, present = self._seen.copy(), len(self._told.fixed) - 1
         for moment in range(present):
             self._advance(seen, moment)
@@ -160,7 +161,7 @@ class Beliefs(OwnArrays):
         self.now.arrays.world["over"] = 0
         self.now.step(self._told.played[moment])
 
-    def _listen(self, observations: FloatArray) -> npt.NDArray[np.int64]:
+    def _listen(self, observations: FloatArray, mates: Records) -> npt.NDArray[np.int64]:
         """Sort what observations (E, N, F) say by its moments; return each tracker's number, (R,)."""
         views = self.layout.views(observations)
         v = {name: view.reshape(self.rows, *view.shape[2:]) for name, view in views.items()}
@@ -173,6 +174,10 @@ class Beliefs(OwnArrays):
             age = np.where(v["neighbour_number"] >= 0, np.rint(v["neighbour_age"] / self.dt), -1)
             place = position[:, None] + v["neighbour_range"] * _complex(v["neighbour_bearing"]) * heading[:, None]
             turned = _complex(v["neighbour_heading"]) * heading[:, None]
+            if self.layout.scenario.drifts:  # from the sender's frame to the own one
+                sender = np.take_along_axis(mates, np.maximum(v["neighbour_number"], 0).astype(np.int64), axis=1)
+                place = place + unit_of(self.layout.scenario) * sender["shift"]
+                turned = turned * np.exp(1j * sender["twist"])
             known = np.nonzero((age >= 0) & (age <= window))
             which = window - age[known].astype(np.int64), known[0], v["neighbour_number"][known].astype(np.int64)
             told.heard[which] = True
@@ -322,8 +327,8 @@ class BeliefPlanner(DDCS):
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
         working = (mates["there"] != 0) | (np.arange(mates.shape[-1]) == me["number"][..., None])
-        actions = beliefs.act(np.asarray(observations, np.float32), working.reshape(-1, mates.shape[-1]))
-        actions = actions.reshape(*shape, 2)
+        by_row = working.reshape(-1, mates.shape[-1]), mates.reshape(-1, mates.shape[-1])
+        actions = beliefs.act(np.asarray(observations, np.float32), *by_row).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.

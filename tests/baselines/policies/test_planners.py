@@ -112,6 +112,13 @@ def test_what_it_cannot_sense_changes_nothing() -> None:
     np.testing.assert_array_equal(played[0], played[1])
 
 
+def test_poses_that_are_told_in_drifting_frames_are_aligned() -> None:
+    drifts: dict[str, Any] = {"odometry_drift": 0.1, "heading_drift": 0.03, "horizon": 300}
+    policy = load("belief-planner")
+    batch = posse.batch("robots", 6, split="train", message_size=policy.message_size, **drifts)
+    assert play(batch, policy)["safe_score"].mean() > 0.5
+
+
 @pytest.mark.parametrize("motion", ["constant", "smart"])
 def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     """What a tracker is told is 0.3 s old; of a constant target it knows the present pose, of a smart one nearly so."""
