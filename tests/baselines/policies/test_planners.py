@@ -27,7 +27,7 @@ def test_impossible_settings_are_refused() -> None:
     [
         ("planner", "ddcs-distributed", "smart", 6, {"horizon": 300}),
         ("planner", "ddcs-distributed", "robots", 6, {"horizon": 300}),
-        pytest.param("planner", "ddcs-distributed", "obstacles", 6, {"horizon": 300}, marks=pytest.mark.long),
+        pytest.param("planner", "ddcs-distributed", "obstacles", 24, {"horizon": 300}, marks=pytest.mark.long),
         ("belief-planner", "ddcs-tuned", "smart", 4, {"horizon": 160, "start_distance": (1.5, 4.0)}),
     ],
 )
