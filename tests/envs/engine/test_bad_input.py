@@ -35,6 +35,7 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("batch", {"num_worlds": 0}, rf"num_worlds=0 {WHOLE} \[1, "),
         ("batch", {"num_worlds": 2**50}, r"num_worlds=1125899906842624 of \d+ bytes each .*: lower it"),
         ("batch", {"first_world": 2**63 - 1, "num_worlds": 2}, rf"first_world \+ num_worlds - 1=.* {WHOLE}"),
+        ("batch", {"num_threads": 0}, rf"num_threads=0 {WHOLE} \[1, "),
         ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
@@ -73,6 +74,7 @@ def test_the_first_bad_action_is_named_wherever_it_stands(number: int, value: fl
 
 BAD_ACTIONS: list[tuple[bool, Any, str]] = [
     (False, f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
+    (False, [0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
     (False, f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
     (False, ["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
     (False, [[0], [0, 1]], r"tracker_3 is not an array"),
@@ -143,6 +145,7 @@ def test_a_step_needs_an_episode(kind: str) -> None:
         ({"tracker_pose": [[11.95, k, 0] for k in range(5)]}, "tracker_0 of world 0 would start in a wall"),
         ({"target_pose": [11.5, 0.0, 0.0]}, r"\(11.5, 0, 0\) leaves the target no room to turn: a disc of .* m"),
         ({"reset_mask": [True]}, r"reset_mask must be a bool array of shape \(2,\)"),
+        ({"reset_mask": np.array([1, 0])}, "reset_mask must be a bool"),
     ],
     ids=str,
 )
