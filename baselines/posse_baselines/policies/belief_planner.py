@@ -131,20 +131,22 @@ class Beliefs(OwnArrays):
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
 
-    def act(self, observations: FloatArray, working: BoolArray, mates: Records) -> FloatArray:
+    def act(self, observations: FloatArray, mates: Records) -> FloatArray:
         """Bring the worlds up to the present; return the action of each tracker in its own, (R, 2).
 
-        ``working`` (R, N): which trackers each one takes to work and to be in range; ``mates`` (R, N): what it knows of
-        them. Observations are (E, N, F).
+        Observations are (E, N, F); ``mates`` (R, N) is what each tracker knows of the others.
         """
-        worlds = self.now.arrays
+        worlds, rows = self.now.arrays, np.arange(self.rows)
+        own = self.layout.views(observations)["number"].astype(np.int64).reshape(-1)
+        working = mates["there"] != 0
+        working[rows, own] = True
         worlds.write(self._past)
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
         self._advance(self._seen, 0)
         self._past.write(worlds)
         for array in self._told:
             array[:-1], array[-1] = array[1:], 0
-        own = self._listen(observations, mates)
+        self._listen(observations, own, mates)
         seen, present = self._seen.copy(), len(self._told.fixed) - 1
         for moment in range(present):
             self._advance(seen, moment)
@@ -153,7 +155,7 @@ class Beliefs(OwnArrays):
         actions = self.search.actions()
         self._told.played[-1] = actions
         self.step += 1
-        return actions[np.arange(self.rows), own, :2]
+        return actions[rows, own, :2]
 
     def _advance(self, seen: Records, moment: int) -> None:
         """Write what was told of a moment, and step the worlds from there."""
@@ -161,13 +163,13 @@ class Beliefs(OwnArrays):
         self.now.arrays.world["over"] = 0
         self.now.step(self._told.played[moment])
 
-    def _listen(self, observations: FloatArray, mates: Records) -> npt.NDArray[np.int64]:
-        """Sort what observations (E, N, F) say by its moments; return each tracker's number, (R,)."""
+    def _listen(self, observations: FloatArray, own: npt.NDArray[np.int64], mates: Records) -> None:
+        """Sort what observations (E, N, F) of the trackers of numbers ``own`` (R,) say by its moments."""
         views = self.layout.views(observations)
         v = {name: view.reshape(self.rows, *view.shape[2:]) for name, view in views.items()}
         told, window = self._told, len(self._told.fixed) - 1
         heading, position = _complex(v["heading"]), _complex(v["position"])
-        own, rows = np.asarray(v["number"], np.int64), np.arange(self.rows)
+        rows = np.arange(self.rows)
         told.heard[-1, rows, own] = True
         told.robots[-1, rows, own] = _poses(position, heading, v["speed"], v["turn_rate"])
         if self.layout.neighbours:
@@ -194,7 +196,6 @@ class Beliefs(OwnArrays):
         fix = np.stack([place, theta, frame, velocity], axis=-1)
         at = window - np.minimum(age, window).astype(np.int64)[fresh], np.flatnonzero(fresh)
         told.fixed[at], told.fix[at] = True, fix[fresh]
-        return own
 
     def _write(self, seen: Records, moment: int) -> None:
         """Write what was told of the present moment of the worlds into them."""
@@ -326,9 +327,8 @@ class BeliefPlanner(DDCS):
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
-        working = (mates["there"] != 0) | (np.arange(mates.shape[-1]) == me["number"][..., None])
-        by_row = working.reshape(-1, mates.shape[-1]), mates.reshape(-1, mates.shape[-1])
-        actions = beliefs.act(np.asarray(observations, np.float32), *by_row).reshape(*shape, 2)
+        by_row = mates.reshape(-1, mates.shape[-1])
+        actions = beliefs.act(np.asarray(observations, np.float32), by_row).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.

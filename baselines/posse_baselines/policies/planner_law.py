@@ -211,15 +211,15 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     w, t, way, place = scene.world, scene.trackers[i], scene.ways[i], scene.teams.slots[scene.plans[i].slot]
     arm, start = arm_of(scene, place), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
-    goal = way_round(start, arm + shift, _CLEARANCE)
-    velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
-    if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene, i, place)
-        if time > _SOON:
-            there = foreseen(scene.path, scene.since + time / scene.config.control_step, place)
-            moved = there - complex(w.x, w.y) - arm
-            velocity = complex(moved.real / time, moved.imag / time)
-            goal = way_round(start, arm, _CLEARANCE) + shift
+    time = arrival_time(scene, i, place) if scene.since >= 0 and way.foresees > 0.0 else 0.0
+    if time > _SOON:
+        there = foreseen(scene.path, scene.since + time / scene.config.control_step, place)
+        moved = there - complex(w.x, w.y) - arm
+        velocity = complex(moved.real / time, moved.imag / time)
+        goal = way_round(start, arm, _CLEARANCE) + shift
+    else:
+        velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
+        goal = way_round(start, arm + shift, _CLEARANCE)
     return approach_velocity(goal - start, velocity, way.gain, float(t.max_speed), acceleration)
 
 
