@@ -167,8 +167,8 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.world.outermost
     me.psi_limit = limit
     psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
-    # A frame that has caught up with the target turns with it. Pursuit counts on that, and is exact on a circle; the
-    # slot law does not, which scores better against a target that weaves.
+    # A frame at the target's heading turns at its rate. With that rate pursuit is exact for a target on a circle; the
+    # slot law scores better without it against one that weaves.
     turn = me.target_turn * math.exp(-me.fix_age / settings.turn_memory) if settings.pngl else 0.0
     me.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
     me.frame = vector(1.0, psi)

@@ -67,7 +67,8 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
         self._shape = self.action_space.shape
-        self._as_batch = (None, None) if isinstance(self._rows, int) else (None,)  # makes it (1, rows, 2 + m)
+        # An action indexed by it has the shape of a batch's, (1, rows, 2 + m).
+        self._as_batch = (None, None) if isinstance(self._rows, int) else (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -137,7 +137,7 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH.
+    ``count`` is at most WIDTH. Control steps alone read ``actions`` (E, rows, 2 + m).
     """
     worlds, c, over = fixed.worlds, fixed.config[0], 0
     for e in range(first, first + count):

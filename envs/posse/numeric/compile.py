@@ -90,7 +90,10 @@ def _digest(value: Any) -> bytes:
 
 
 class _Reached(pickle.Pickler):
-    """Writes functions with all that they reach, and classes by what compiled code sees of them."""
+    """Writes functions with all that they reach, and classes by what compiled code sees of them.
+
+    What is written is hashed and never read, so that the ``repr`` of a reduced value is never called.
+    """
 
     def reducer_override(self, value: Any) -> Any:
         function = getattr(value, "py_func", value)

@@ -78,7 +78,7 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
             near &= near - 1
     if to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    whole = c.sonar_beams // WIDTH
+    whole = c.sonar_beams // WIDTH  # blocks; after those, another would write beyond the sonar's part
     for block in range(whole):
         store(o, first + WIDTH * block, load(s.reading, WIDTH * block))
     for k in range(WIDTH * whole, c.sonar_beams):
