@@ -1,8 +1,12 @@
-"""Settings of every process that runs tests, made before any library is imported."""
+"""Settings of every process that runs tests, made before any library of numbers or windows is imported."""
 
 import os
+
+from hypothesis import settings
 
 # Small networks do not gain from torch's threads, which wait for each other by spinning.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Windows of tests need no screen.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+# Properties are tried on the same examples in every run, and however long one takes.
+settings.load_profile("ci")

@@ -11,14 +11,12 @@ import posse
 from posse_baselines import PolicyError, begin, load
 from posse_baselines.tracker_env import TrackerEnv
 
-SHORT: dict[str, Any] = {"horizon": 40}
-
 
 def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
     policy = load("ddcs-distributed")
-    env = TrackerEnv("smart", number=2, silent=False, seed=5, **SHORT)
+    env = TrackerEnv("smart", number=2, silent=False, seed=5, horizon=40)
     own, _ = env.reset()
-    batch = posse.batch("smart", 1, seed=5, message_size=policy.message_size, **SHORT)
+    batch = posse.batch("smart", 1, seed=5, message_size=policy.message_size, horizon=40)
     memory, observations = begin(policy, batch), batch.reset()
     for _ in range(40):
         np.testing.assert_array_equal(own, observations[0, 2])

@@ -73,12 +73,6 @@ def test_without_a_file_the_untuned_policy_is_played_and_the_split_of_tuning_is_
         evaluate(name, "constant", 1, split="train", progress=False)
 
 
-def write(path: Path, **changes: Any) -> Path:
-    card = {"format": FORMAT, "policy": "pngl", "scenario": "smart", "settings": {"near": 0.5}}
-    path.write_text(json.dumps({**card, **changes}))
-    return path
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -91,5 +85,8 @@ def write(path: Path, **changes: Any) -> Path:
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    card = {"format": FORMAT, "policy": "pngl", "scenario": "smart", "settings": {"near": 0.5}}
+    path = tmp_path / "x.json"
+    path.write_text(json.dumps({**card, **changes}))
     with pytest.raises(PolicyError, match=message):
-        load(write(tmp_path / "x.json", **changes))
+        load(path)

@@ -37,12 +37,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def pages(site: Path) -> list[Path]:
-    found = sorted(site.rglob("*.html"))
-    assert len(found) > 15
-    return found
-
-
 def test_the_manual_is_short() -> None:
     pages = [*DOCS.rglob("*.md")]
     texts = [path.read_text(encoding="utf-8") for path in (*pages, ROOT / "CONTRIBUTING.md")]
@@ -102,14 +96,14 @@ def test_pages_fit_are_short_and_ask_no_other_host(site: Path, address: str, wid
         page.on("request", lambda request: asked.append(request.url))
         page.on("pageerror", lambda error: failed.append(str(error)))
         page.on("response", lambda got: failed.append(got.url) if got.status >= 400 else None)
-        faults = []
-        for path in pages(site):
-            if path.name == "index.html":
-                where = path.parent.relative_to(site).as_posix()
-                page.goto(address + ("" if where == "." else where + "/"))
-                wide, height, cut, broken = page.evaluate(LOOK)
-                if wide > width or broken or height > SCREENS * screen or (cut and width == WIDE[0]):
-                    faults.append((where, wide, height, cut, broken))
+        faults, pages = [], sorted(site.rglob("index.html"))
+        assert len(pages) > 15
+        for path in pages:
+            where = path.parent.relative_to(site).as_posix()
+            page.goto(address + ("" if where == "." else where + "/"))
+            wide, height, cut, broken = page.evaluate(LOOK)
+            if wide > width or broken or height > SCREENS * screen or (cut and width == WIDE[0]):
+                faults.append((where, wide, height, cut, broken))
         assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
         assert failed == []
         assert faults == []

@@ -162,7 +162,7 @@ def judge(batch: posse.Batch, observations: npt.NDArray[np.float32], seed: int, 
         assert float(infos[f"metrics/{name}"][0]) == pytest.approx(value, rel=1e-4, abs=1e-3, nan_ok=True), name
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(name=some(*NAMES), changes=SETTINGS, seed=st.integers(0, 2**63 - 1), team=some("is drawn", "chases", "forms"))
 def test_a_world_goes_as_an_independent_computation_says(
     name: str, changes: dict[str, Any], seed: int, team: str

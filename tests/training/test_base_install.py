@@ -42,15 +42,12 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     assert "pip install '.[training]'" in done.stderr.splitlines()[-1]
 
 
-COMPARE = ["compare", "idle", "--scenario", "constant", "--episodes", "2"]
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
         ["scenarios"],
         *([command, "--help"] for command in ("train", "record", "export")),
-        pytest.param(COMPARE, marks=pytest.mark.long),
+        pytest.param(["compare", "idle", "--scenario", "constant", "--episodes", "2"], marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif", "--seconds", "1"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],

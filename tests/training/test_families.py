@@ -17,7 +17,7 @@ SHORT: dict[str, Any] = {"horizon": 40, "settle_time": 1.0}
 OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.0), **SHORT)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(0, 10**6), st.sampled_from(["train", "validation", "test"]))
 def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: int, split: str) -> None:
     family = posse.family("obstacles", num_obstacles=(0, 3), target_speed=(0.3, 0.5))

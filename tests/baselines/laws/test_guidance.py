@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.support.reference.motion import on_arc
 
@@ -16,7 +16,6 @@ from posse_baselines.laws.formation import Demand
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.guidance import BODY, line_of_sight, regulate
 
-PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
 ANGLES = st.floats(-math.pi, math.pi)
 
 
@@ -34,7 +33,6 @@ def test_line_of_sight_points_from_tracker_to_target() -> None:
     assert math.isfinite(guidance.bearing_rate(0.0, 1j, -1j))
 
 
-@PROPERTY
 @given(st.floats(0.5, 9.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_bearing_rate_is_the_derivative_of_the_bearing(
     r: float, sigma: float, theta: float, target_theta: float, speed: float, target_speed: float
@@ -51,7 +49,6 @@ def test_bearing_rate_is_the_derivative_of_the_bearing(
 # --- the law -------------------------------------------------------------------------------------
 
 
-@PROPERTY
 @given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES)
 def test_the_general_law_is_k_sigma_plus_c(sigma: float, k: float, wanted_sigma: float, psi: float) -> None:
     away = short_way(sigma - wanted_sigma)
@@ -62,7 +59,6 @@ def test_the_general_law_is_k_sigma_plus_c(sigma: float, k: float, wanted_sigma:
     assert short_way(heading - (k * sigma + c)) == pytest.approx(0.0, abs=1e-9)
 
 
-@PROPERTY
 @given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES, st.floats(-1, 1), st.floats(-1, 1))
 def test_the_rate_is_the_derivative_of_the_heading(
     sigma: float, k: float, wanted_sigma: float, psi: float, sigma_rate: float, psi_rate: float
@@ -82,7 +78,6 @@ def test_the_rate_is_the_derivative_of_the_heading(
 # --- the speed of (13) ---------------------------------------------------------------------------
 
 
-@PROPERTY
 @given(st.floats(0.3, 5.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.3, 5.0))
 def test_the_range_closes_at_its_gain(
     r: float, sigma: float, target_theta: float, delta: float, target_speed: float, wanted: float
@@ -124,7 +119,6 @@ def body_of(theta: float = 0.0, speed: float = 0.0, limits: tuple[float, float] 
     return body
 
 
-@PROPERTY
 @given(ANGLES, ANGLES, st.floats(0.01, 2.0), st.floats(-0.5, 0.5))
 def test_regulation_turns_the_short_way_and_never_reverses(
     theta: float, wanted: float, speed: float, rate: float
@@ -153,7 +147,6 @@ OFFSET = 0.15
 # --- l-φ -----------------------------------------------------------------------------------------
 
 
-@PROPERTY
 @given(st.floats(0.3, 4.0), ANGLES, ANGLES, st.floats(0.5, 2.0), ANGLES, st.floats(0.0, 1.0), st.floats(-1.0, 1.0))
 def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
     l_now: float, phi: float, turned: float, l_d: float, phi_d: float, leader_speed: float, leader_omega: float
@@ -168,7 +161,6 @@ def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
     assert phi_rate == pytest.approx(1.5 * short_way(phi_d - phi), abs=1e-9)
 
 
-@PROPERTY
 @given(st.floats(-0.5, 2.0), st.floats(-0.8, 0.8), st.sampled_from((0.01, 0.1, 0.2)))
 def test_a_held_command_takes_the_control_point_where_its_velocity_leads(
     ahead: float, across: float, dt: float
@@ -185,7 +177,6 @@ def test_the_sampled_rate_leaves_what_an_exponential_leaves() -> None:
         assert left == pytest.approx(math.exp(-alpha * dt))
 
 
-@PROPERTY
 @given(st.floats(-5.0, 5.0), st.floats(-20.0, 20.0))
 def test_limits_hold_and_reversing_becomes_a_turn(speed: float, omega: float) -> None:
     limited = formation.limit_command(body_of(), speed, omega, OFFSET)

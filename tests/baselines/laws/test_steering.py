@@ -20,12 +20,10 @@ from posse_baselines.laws.steering import (
     way_round,
 )
 
-PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
 PLACES = st.floats(-20.0, 20.0)
 SPEEDS = st.floats(-0.6, 0.6)
 
 
-@PROPERTY
 @given(PLACES, PLACES, SPEEDS, SPEEDS, st.floats(0.9, 1.5))
 def test_a_point_is_met_as_soon_as_the_robot_gets_as_far(x: float, y: float, vx: float, vy: float, top: float) -> None:
     assume(math.hypot(vx, vy) < top - 0.01)
@@ -43,7 +41,6 @@ def test_a_point_that_gets_away_is_never_met() -> None:
     assert intercept_time(3 + 4j, 0.6 + 0.8j, 1.0) == NEVER
 
 
-@PROPERTY
 @given(st.floats(0.05, 10.0), st.floats(0.2, 4.0))
 def test_an_approach_leaves_room_to_brake(distance: float, deceleration: float) -> None:
     velocity = approach_velocity(complex(distance), 0j, 2.0, 1.0, deceleration)
@@ -52,7 +49,6 @@ def test_an_approach_leaves_room_to_brake(distance: float, deceleration: float) 
     assert velocity.real**2 / (2.0 * deceleration) <= distance
 
 
-@PROPERTY
 @given(st.floats(-math.pi, math.pi), st.floats(1.0, 6.0), st.floats(-math.pi, math.pi))
 def test_the_way_round_keeps_clear_and_arrives(start: float, away: float, end: float) -> None:
     position, goal, least = cmath.rect(away, start), cmath.rect(1.2, end), away
@@ -73,7 +69,6 @@ def test_a_slot_moves_on_a_circle_of_its_own() -> None:
     assert slot_heading(1e-3j, 0.0, 1 + 0j, 0.7) == 0.7
 
 
-@PROPERTY
 @given(
     st.complex_numbers(min_magnitude=0.01, max_magnitude=10.0),
     st.complex_numbers(max_magnitude=0.99),
@@ -95,7 +90,7 @@ def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: c
         assert -1e-9 <= share.real <= gain
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(1, 24), st.integers(0, 12), st.integers(0, 12), st.integers(0, 2**31), st.booleans())
 def test_the_sum_of_the_costs_is_the_least(n: int, absent: int, more: int, seed: int, ties: bool) -> None:
     cost = np.random.default_rng(seed).uniform(-5, 20, (n, n + more))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from safetensors.numpy import save
 from tests.support.learned import any_policy, observations_of
@@ -19,7 +19,6 @@ from posse_baselines.learned.policy import write_policy_file
 
 POLICY = any_policy()
 TENSORS = POLICY.network.tensors()
-PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
 RUNS_CODE = ("exec", "compile", "import", "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen")
 _seen: list[str] | None = None
 
@@ -82,7 +81,6 @@ def read(content: bytes) -> Policy | None:
     return policy
 
 
-@PROPERTY
 @given(st.binary(max_size=300))
 @example(b"cos\nsystem\n(S'true'\ntR.")  # a pickle that runs a command
 @example(save({"a": np.zeros(3)}))
@@ -91,7 +89,6 @@ def test_other_bytes_are_refused_and_not_run(content: bytes) -> None:
     assert read(len(content).to_bytes(8, "little") + content) is None  # as the header of safetensors begins
 
 
-@PROPERTY
 @given(where=st.floats(0, 0.999999) | st.floats(0, 0.01), bit=st.integers(0, 7), kept=st.floats(0, 1))
 def test_a_damaged_file_is_refused_or_plays_the_same(whole: bytes, where: float, bit: int, kept: float) -> None:
     flipped = bytearray(whole)

@@ -71,12 +71,7 @@ def test_a_refused_call_changes_nothing(kind: str) -> None:
     run_state_machine_as_test(
         type("Calls", (Calls,), {"kind": kind}),
         settings=settings(
-            derandomize=True,
-            database=None,
-            deadline=None,
-            max_examples=3 if kind == "torchrl" else 8,
-            stateful_step_count=25,
-            suppress_health_check=list(HealthCheck),
+            max_examples=3 if kind == "torchrl" else 8, stateful_step_count=25, suppress_health_check=list(HealthCheck)
         ),
     )
 
@@ -161,7 +156,7 @@ def test_any_form_of_the_same_numbers_is_the_same_action(kind: str, form: Any) -
     assert same(one.env.step(whole)[:4], other.env.step(given)[:4])
 
 
-@pytest.mark.parametrize("kind", [kind for kind in MAKERS if kind != "torchrl"])
+@one_by_one
 def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kind: str) -> None:
     bounds = np.sign(VALUES + np.float32(0.1))
     rounded, clipping, reference = started(kind), started(kind, clip_actions=True), started(kind)

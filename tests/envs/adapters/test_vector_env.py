@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from tests.support.adapters import play_both
+from tests.support.adapters import same
 
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 from posse.adapters.vector_env import TeamVectorEnv
@@ -43,12 +43,27 @@ def test_the_vector_environment_agrees_with_gymnasiums(
     name: str, settings: dict[str, Any], mode: AutoresetMode
 ) -> None:
     name = f"posse/{name}-v0"
-    ours = vector(name, autoreset=mode.name.lower(), **settings)
+    ours: Any = vector(name, autoreset=mode.name.lower(), **settings)
     makers = [partial(gymnasium.make, name, first_world=i, **settings) for i in range(E)]
-    theirs = SyncVectorEnv(makers, autoreset_mode=mode)
+    theirs: Any = SyncVectorEnv(makers, autoreset_mode=mode)
     assert ours.autoreset_mode is ours.metadata["autoreset_mode"] is mode
     assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    terminations, truncations = play_both(ours, theirs, mode, 80)
+    for space in ("single_observation_space", "single_action_space", "observation_space", "action_space"):
+        assert getattr(ours, space) == getattr(theirs, space), space
+    assert same(ours.reset(seed=6), theirs.reset(seed=[6] * E))
+    ours.action_space.seed(0)
+    terminations = truncations = 0
+    for _ in range(80):
+        actions = ours.action_space.sample()
+        mine, other = ours.step(actions), theirs.step(actions)
+        for a, b in zip(mine[:4], other[:4], strict=True):
+            assert a.dtype == b.dtype
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=0)
+        assert same(mine[4], other[4])
+        terminations, truncations, ended = terminations + mine[2].sum(), truncations + mine[3].sum(), mine[2] | mine[3]
+        if mode is AutoresetMode.DISABLED and ended.any():
+            again = [env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs)]
+            assert same(*again)
     assert terminations > 0
     assert truncations > 0
 

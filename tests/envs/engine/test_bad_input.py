@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.support.adapters import f32
 from tests.support.attack import LONG_NAME, MAKERS, Subject
@@ -55,7 +55,6 @@ def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str)
         MAKERS[kind](**arguments)
 
 
-@settings(deadline=None)
 @given(
     number=st.integers(0, 37 * 5 * 2 - 1),
     value=st.sampled_from([math.nan, math.inf, -math.inf, 1.00001, -1.00001, 3.0]),

@@ -78,7 +78,7 @@ def in_the_largest_arena(speed: float, radius: float) -> dict[str, Any]:
     }
 
 
-@settings(derandomize=True, max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(name=st.sampled_from(posse.scenario_names()), changes=SETTINGS, crowds=st.booleans(), seed=st.integers(0, 1000))
 @example(name="obstacles", changes={"target_turn_rate": 0.6, "arena": 16.0, **CROWDED}, crowds=True, seed=7)
 @example(name="constant", changes=in_the_largest_arena(17.0, 0.4), crowds=True, seed=3)
@@ -146,7 +146,7 @@ def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(motion: str, turn:
 F = np.float32
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     theta=st.floats(-math.pi, math.pi),
     speed=st.floats(0, 100),
@@ -175,7 +175,7 @@ def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
         np.testing.assert_allclose(length, 1.0, rtol=0, atol=3e-7)
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     speed=st.floats(1.0, 100.0),
     away=st.floats(0.5, 9.0),

@@ -92,7 +92,7 @@ def test_poses_change_the_poses_and_no_other_draw() -> None:
         np.testing.assert_allclose(drawn.step(actions)[0], given.step(actions)[0], rtol=1e-4, atol=1e-3)
 
 
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     x=st.floats(-9.7, 9.7),
     y=st.floats(-9.7, 9.7),

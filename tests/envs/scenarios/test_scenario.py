@@ -13,7 +13,6 @@ from tests.support.reference.state import directions, points
 
 import posse
 from posse import Scenario, ScenarioError
-from posse.scenarios import get_scenario, scenario_names
 from posse.scenarios.scenario import FORMATIONS
 from posse_baselines import load, rollout
 
@@ -179,17 +178,17 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
 # --- the named scenarios --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", posse.scenario_names())
 def test_its_bound_leaves_room_to_distinguish_teams(name: str) -> None:
     played = rollout(posse.batch(name, 6, seed=5), load("random"))
-    assert (played.lengths == get_scenario(name).horizon).all()
+    assert (played.lengths == posse.get_scenario(name).horizon).all()
     score, bound = played.metrics["score"], played.metrics["bound"]
     assert ((score >= 0) & (score <= bound + 1e-6)).all()
     assert 0.6 < bound.mean() < 0.99
 
 
 def test_in_leader_loss_the_leader_alone_sees_the_target_from_its_slot() -> None:
-    s = get_scenario("leader-loss")
+    s = posse.get_scenario("leader-loss")
     distances = sorted(math.hypot(x, y) for x, y in s.slot_offsets)
     assert distances[0] + s.tolerance < s.sensing_range < distances[1] - s.tolerance
     # At the start everyone does, so that nothing but the loss is tested.

@@ -17,7 +17,7 @@ from posse_training.train.vec_env import TeamVecEnv
 HORIZON = 12
 
 
-def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> TeamVecEnv:
+def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> Any:
     """One batch, or a batch for each world, whose first episodes are not shortened."""
     values = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5, "autoreset": "disabled", **settings}
     kind = values.pop("kind", "plain")
@@ -26,13 +26,7 @@ def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, *
     return TeamVecEnv(batches, Encoding.of(batches[0].layout, kind), see_state=see_state)
 
 
-def move(env: TeamVecEnv, actions: Any) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
-    """Step, without type checks of the result."""
-    return env.step(actions)
-
-
-def draw(env: TeamVecEnv, generator: np.random.Generator) -> Any:
-    assert env.action_space.shape is not None
+def draw(env: Any, generator: np.random.Generator) -> Any:
     return generator.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
 
 
@@ -44,7 +38,7 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
     total = np.zeros((3, 5))
     for step in range(1, 3 * HORIZON + 1):
         actions = draw(env, generator)
-        observations, rewards, dones, infos = move(env, actions)
+        observations, rewards, dones, infos = env.step(actions)
         expected, wanted, _, truncated, info = batch.step(actions.reshape(3, 5, 2))
         np.testing.assert_array_equal(observations.reshape(3, 5, -1), expected)
         np.testing.assert_array_equal(rewards.reshape(3, 5), wanted)
@@ -68,7 +62,7 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
 def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5}
     batches = [posse.batch("smart", 1, first_world=e, autoreset="disabled", **settings) for e in range(3)]
-    env = TeamVecEnv(batches, Encoding.of(batches[0].layout), safeguard=True)
+    env: Any = TeamVecEnv(batches, Encoding.of(batches[0].layout), safeguard=True)
     bare = posse.batch("smart", 3, autoreset="disabled", **settings)
     guard = Guard(bare.layout, 3)
     env.reset()
@@ -76,7 +70,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     generator = np.random.default_rng(1)
     for _ in range(2 * HORIZON):
         wanted = draw(env, generator)
-        observations, _, dones, _ = move(env, wanted)
+        observations, _, dones, _ = env.step(wanted)
         seen, *_ = bare.step(guard.actions(seen, wanted.reshape(3, 5, 2)))
         if dones.any():
             seen = bare.reset(options={"reset_mask": np.ones(3, np.bool_)})
@@ -90,7 +84,7 @@ def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
     told: list[dict[str, Any]] = []
     forward = np.tile(np.array([1.0, 0.3], np.float32), (env.num_envs, 1))
     for _ in range(399):  # one less than an episode
-        _, _, _, infos = move(env, forward)
+        _, _, _, infos = env.step(forward)
         told += [info for info in infos if "terminal_observation" in info]
     assert told
     assert not any(info["TimeLimit.truncated"] for info in told)
@@ -102,7 +96,7 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     generator = np.random.default_rng(0)
     ends: list[list[int]] = [[] for _ in range(4)]
     for step in range(1, 4 * HORIZON + 1):
-        seen, _, dones, infos = move(env, draw(env, generator))
+        seen, _, dones, infos = env.step(draw(env, generator))
         raw = seen[:, env.encoding.num_features :].reshape(4, 5, -1)
         anew = Encoder(env.encoding, env.batches[0].layout, 4).encode(raw)  # which averages no earlier fixes
         np.testing.assert_array_equal(seen[dones], anew[dones])
@@ -114,7 +108,7 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     # A reset spreads the episodes again.
     env.reset()
     for _ in range(HORIZON // 4):
-        _, _, dones, _ = move(env, draw(env, generator))
+        _, _, dones, _ = env.step(draw(env, generator))
     np.testing.assert_array_equal(dones[::5], [True, False, False, False])
 
 
@@ -124,20 +118,20 @@ def test_teams_of_several_sizes_and_scenarios() -> None:
         posse.batch("radio", 3, num_trackers=7, autoreset="disabled", horizon=50),
     ]
     encoding = Encoding.of(batches[1].layout, "features", 4)
-    env = TeamVecEnv(batches, encoding, see_state=True)
+    env: Any = TeamVecEnv(batches, encoding, see_state=True)
     assert env.num_envs == 2 * 3 + 3 * 7
     observations = env.reset()
     again = posse.batch("radio", 3, num_trackers=7, horizon=50)
     expected = Encoder(encoding, again.layout, again.num_worlds).encode(again.reset())
     np.testing.assert_array_equal(observations[6:, : encoding.size], expected)
-    assert np.isfinite(move(env, np.zeros((27, 2), np.float32))[0]).all()
+    assert np.isfinite(env.step(np.zeros((27, 2), np.float32))[0]).all()
 
 
 def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     env = make(worlds=2, see_state=True)
     env.reset()
     for step in range(HORIZON):
-        observations, _, dones, infos = move(env, np.zeros((10, 2), np.float32))
+        observations, _, dones, infos = env.step(np.zeros((10, 2), np.float32))
         assert dones.all() == (step == HORIZON - 1)
     time_left = env.encoding.size + 5
     assert observations[:, time_left] == pytest.approx(HORIZON * 0.1)
