@@ -118,20 +118,20 @@ def training_seeds() -> str:
 
 
 def algorithms() -> str:
-    """Return what algorithms reach from nothing: the mean of their training seeds, and their range."""
+    """Return what algorithms reach from nothing: the mean of their seeds and its range; of one seed, the interval."""
     runs = _rows(RESULTS / "algorithms.csv")
     rows = []
     names = ("scenario", "algorithm", "safeguard")
     for which in sorted({tuple(run[name] for name in names) for run in runs}):
         mine = [run for run in runs if tuple(run[name] for name in names) == which]
         safe = [float(run["safe_score"]) for run in mine]
-        spread = f" [{min(safe):.3f}, {max(safe):.3f}]" if len(safe) > 1 else ""
+        least, greatest = (min(safe), max(safe)) if len(safe) > 1 else (float(mine[0][end]) for end in ("low", "high"))
         score, contact = (_mean(float(run[name]) for run in mine) for name in ("score", "contact_free"))
         layer = "safeguard" if which[2] == "True" else "bare"
         steps = f"{float(mine[0]['steps']) / 1e6:.0f} M"
-        numbers = (f"{_mean(safe):.3f}{spread}", f"{score:.3f}", f"{1 - contact:.1%}")
+        numbers = (f"{_mean(safe):.3f} [{least:.3f}, {greatest:.3f}]", f"{score:.3f}", f"{1 - contact:.1%}")
         rows.append((code(which[0]), which[1], layer, steps, len(mine), *numbers))
-    header = ("scenario", "algorithm", "behind", "steps", "seeds", "safe score [least, greatest]", "score", "contact")
+    header = ("scenario", "algorithm", "behind", "steps", "seeds", "safe score", "score", "worlds with contact")
     return table(header, rows)
 
 
