@@ -199,7 +199,7 @@ def execute_safely(team: Team, me: Record, discs: Records, action: FloatArray) -
         velocity = detour(team, me, discs, velocity)
     velocity, evades = safe_velocity(me, discs, velocity)
     if evades or velocity != me.wish:
-        speed, omega = regulate(me, velocity, 0.0)
+        speed, omega = regulate(me, velocity)
     # Made up for the lag, and remembered until it is executed.
     more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), int(team.world.delay)
     speed += more * (speed - me.speed)
@@ -223,8 +223,8 @@ def correct(me: Record, correction: complex) -> None:
     wish = me.wish + scaled(correction * me.heading, me.max_speed)
     excess = max(1.0, length(wish) / max(me.max_speed, length(me.wish)))
     wish = scaled(wish, 1.0 / excess)
-    old_speed, old_omega = regulate(me, me.wish, 0.0)
-    speed, omega = regulate(me, wish, 0.0)
+    old_speed, old_omega = regulate(me, me.wish)
+    speed, omega = regulate(me, wish)
     me.wish = wish
     me.wish_speed += speed - old_speed
     me.wish_omega += omega - old_omega

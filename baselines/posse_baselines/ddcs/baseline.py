@@ -183,7 +183,7 @@ def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, a
     wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
     foresee(team, me)
     place_mates(team, me, mates)
-    want(me, wanted, 0.0)
+    want(me, wanted)
     execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
 
 

@@ -75,7 +75,7 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
 
 
 @compiled
-def want(me: Record, velocity: complex, rate: float) -> None:
+def want(me: Record, velocity: complex, rate: float = 0.0) -> None:
     """Set a wanted velocity (m/s) that turns at ``rate`` (rad/s), with its command."""
     me.wish = velocity
     me.wish_speed, me.wish_omega = guidance.regulate(me, velocity, rate)
@@ -87,7 +87,7 @@ def move(team: Team, me: Record, mates: Records) -> None:
     settings = team.settings
     me.closing = 0
     if me.task == SEARCHING or me.slot < 0:
-        want(me, explore(team, me, mates), 0.0)
+        want(me, explore(team, me, mates))
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
     elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
@@ -99,7 +99,7 @@ def move(team: Team, me: Record, mates: Records) -> None:
             ref = place_by(team, me, mates[me.leader], 0)
             slot = steering.slot_velocity(vector(ref.speed, ref.theta), ref.frame_rate, ref.place - ref.position)
             way = ref.place - me.position
-            want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration), 0.0)
+            want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration))
     elif settings.pngl:
         pursue(team, me)
     else:
@@ -117,7 +117,7 @@ def hunt(team: Team, me: Record) -> None:
     side = 1.0 if me.slot % 2 else -1.0
     angle = me.target_theta + side * ((me.slot + 1) // 2) * 2.0 * math.pi / len(team.slots)
     way = me.target + vector(settings.hunt_growth * me.fix_age, angle) - me.position
-    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))), 0.0)
+    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))))
 
 
 @compiled
@@ -137,7 +137,7 @@ def hold_slot(team: Team, me: Record) -> None:
     share = (1.0 - math.exp(-time / settings.weave_time)) * settings.weave_time / time
     slot = scaled(steering.slot_velocity(me.target_velocity, me.psi_rate, arm), share)
     slot += scaled(me.target_mean, 1.0 - share)
-    want(me, steering.approach_velocity(way, slot, gain, me.max_speed, me.acceleration), 0.0)
+    want(me, steering.approach_velocity(way, slot, gain, me.max_speed, me.acceleration))
 
 
 @compiled

@@ -137,7 +137,7 @@ def turn_command(body: Record, error: float, time: float) -> float:
 
 
 @compiled
-def regulate(body: Record, velocity: complex, rate: float) -> tuple[float, float]:
+def regulate(body: Record, velocity: complex, rate: float = 0.0) -> tuple[float, float]:
     """Return the command (V, ω) of a robot that tracks a velocity (m/s) within its limits.
 
     V is the part of the velocity that lies ahead, and 0 while it points backwards: the robot turns

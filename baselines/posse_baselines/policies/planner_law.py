@@ -249,7 +249,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         velocity = wanted_velocity(scene, i, me.acceleration)
         discs = work.discs[: surround(scene, i, work.discs)]
         me.wish, _ = safe_velocity(me, discs, velocity)
-        v, omega = regulate(me, me.wish, 0.0)
+        v, omega = regulate(me, me.wish)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
             v, omega = v + more * (v - me.speed), omega + more * (omega - me.omega)

@@ -133,11 +133,11 @@ def test_regulation_turns_the_short_way_and_never_reverses(
 
 
 def test_a_zero_velocity_keeps_the_heading() -> None:
-    assert regulate(body_of(0.3), -1e-4 + 1e-4j, 0.0) == (0.0, 0.0)
+    assert regulate(body_of(0.3), -1e-4 + 1e-4j) == (0.0, 0.0)
 
 
 def test_a_robot_of_limited_turn_acceleration_brakes_its_turn() -> None:
-    _, omega = regulate(body_of(limits=(1e4, 1.0), dt=0.05), 1j, 0.0)
+    _, omega = regulate(body_of(limits=(1e4, 1.0), dt=0.05), 1j)
     assert 1.0 < omega < math.sqrt(math.pi)  # comes to rest within a right angle at 1 rad/s²
 
 
