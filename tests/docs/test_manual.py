@@ -96,7 +96,8 @@ def test_pages_fit_are_short_and_ask_no_other_host(site: Path, address: str, wid
         page.on("request", lambda request: asked.append(request.url))
         page.on("pageerror", lambda error: failed.append(str(error)))
         page.on("response", lambda got: failed.append(got.url) if got.status >= 400 else None)
-        faults, pages = [], sorted(site.rglob("index.html"))
+        faults = []
+        pages = sorted(site.rglob("index.html"))
         assert len(pages) > 15
         for path in pages:
             where = path.parent.relative_to(site).as_posix()

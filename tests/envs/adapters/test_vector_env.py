@@ -60,7 +60,9 @@ def test_the_vector_environment_agrees_with_gymnasiums(
             assert a.dtype == b.dtype
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=0)
         assert same(mine[4], other[4])
-        terminations, truncations, ended = terminations + mine[2].sum(), truncations + mine[3].sum(), mine[2] | mine[3]
+        terminations += mine[2].sum()
+        truncations += mine[3].sum()
+        ended = mine[2] | mine[3]
         if mode is AutoresetMode.DISABLED and ended.any():
             again = [env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs)]
             assert same(*again)
