@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import unknown
-from posse.numeric import ONE, BoolArray, FloatArray, kernel
+from posse.numeric import ONE, WIDTH, BoolArray, FloatArray, kernel
+from posse.numeric.lanes import ALL, bits, load
 from posse.scenarios import Scenario, ScenarioError
 
 MOST_ACTION: Final = np.float32(1 + 1e-6)
@@ -79,8 +80,11 @@ def as_float32(name: str, value: object, shape: tuple[int, ...] | None = None) -
 def all_in_box(actions: FloatArray) -> bool:
     """Return whether all actions are in [-1, 1]."""
     flat, inside = actions.reshape(-1), True
-    for k in range(len(flat)):
-        inside &= flat[k] >= -ONE and flat[k] <= ONE
+    whole = len(flat) // WIDTH * WIDTH
+    for k in range(0, whole, WIDTH):
+        inside &= bits(abs(load(flat, k)) <= ONE) == ALL
+    for k in range(whole, len(flat)):
+        inside &= abs(flat[k]) <= ONE
     return inside
 
 

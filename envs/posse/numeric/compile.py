@@ -52,7 +52,7 @@ def out_of_line(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """Compile a function that is called from Python.
+    """Compile a function that is called from Python with arrays that do not overlap.
 
     The machine code is kept in ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. It is compiled again
     if a source of posse changes, or anything that a function from elsewhere reaches (:func:`stamp`).
@@ -175,11 +175,15 @@ def _announce() -> None:
 
 
 class _Library(codegen.JITCodeLibrary):
-    """LLVM code of a kernel, in which no loop is unrolled or vectorised: most run a few times. Kernels gain 20 %."""
+    """LLVM code of a kernel, in which no loop is unrolled or vectorised: most run a few times. Kernels gain 20 %.
+
+    Neighbouring scalars are vectorised (SLP) instead; that and ``noalias`` below gain 2 %.
+    """
 
     def _optimize_final_module(self) -> None:
         options = llvm.create_pipeline_tuning_options(_CONFIG.OPT)
         options.loop_unrolling = options.loop_vectorization = False
+        options.slp_vectorization = True
         builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)
 
@@ -204,7 +208,9 @@ class _Compiler(compiler.CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
-        library = _InnerLibrary if state.flags.no_cpython_wrapper else _Library
+        inner = state.flags.no_cpython_wrapper
+        state.flags.noalias = not inner
+        library = _InnerLibrary if inner else _Library
         state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]

@@ -29,6 +29,8 @@ from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infe
 from posse.numeric.arrays import FloatArray, Record
 
 WIDTH: Final = 8
+ALL: Final = 2**WIDTH - 1
+"""The :func:`bits` of a mask that is true everywhere."""
 
 Lanes = Any
 """Eight float32."""

@@ -10,7 +10,7 @@ import functools
 import itertools
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from queue import SimpleQueue
 from typing import Any, Final
 
@@ -50,13 +50,14 @@ def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
 def _shares_of(num_worlds: int, threads: int) -> list[tuple[int, int]]:
     """Return shares of whole eights of worlds, ever smaller ones, so that the threads end at the same time.
 
-    The first is half of a thread's part: a thread that the system interrupts leaves the rest to the others.
+    The first is three quarters of a thread's part: a thread that the system interrupts leaves the rest to the others.
+    The last is the caller's, so that it ends last: to wake it would take as long as fifty worlds.
     """
-    ends = [0]
-    while ends[-1] < num_worlds:
-        share = max(_LEAST_SHARE, (num_worlds - ends[-1]) // (2 * threads) // WIDTH * WIDTH)
-        ends.append(min(num_worlds, ends[-1] + share))
-    return list(itertools.pairwise(ends))
+    ends, last = [0], max(0, num_worlds - _LEAST_SHARE) // WIDTH * WIDTH
+    while ends[-1] < last:
+        share = max(_LEAST_SHARE, 3 * (last - ends[-1]) // (4 * threads) // WIDTH * WIDTH)
+        ends.append(min(last, ends[-1] + share))
+    return list(itertools.pairwise([*ends, num_worlds]))
 
 
 def over_worlds(
@@ -70,12 +71,13 @@ def over_worlds(
     threads = threads_for(num_worlds, robots_each, most)
     if threads == 1:
         return [kernel(*arguments, 0, 0, num_worlds)]
-    shares = iter(_shares_of(num_worlds, threads))  # all threads take from it
+    *before, last = _shares_of(num_worlds, threads)
+    shared, own = iter(before), iter([last])  # all threads take from the first
     results: list[Any] = []
     errors: list[BaseException] = []
     turns = [threading.RLock() for _ in range(threads)]  # each is held by its thread, in the end by the caller
 
-    def take(thread: int) -> None:
+    def take(thread: int, shares: Iterable[tuple[int, int]]) -> None:
         for first, end in shares:
             try:
                 results.append(kernel(*arguments, thread, first, end))
@@ -84,11 +86,11 @@ def over_worlds(
 
     def work(thread: int) -> None:
         if turns[thread].acquire(blocking=False):  # otherwise the caller has done all
-            take(thread)
+            take(thread, shared)
             turns[thread].release()
 
     def finish() -> None:
-        take(0)
+        take(0, itertools.chain(shared, own))
         for turn in turns:
             turn.acquire()
 
