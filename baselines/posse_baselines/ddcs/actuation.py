@@ -39,7 +39,6 @@ _SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
 _EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
 _TAKEN_TIME: Final = 3.0  # s; longest time for which a slot counts as taken after an echo from it
 _MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
-_FORGOTTEN: Final = 30.0  # s; silence after which a team-mate is no longer assumed at its last position
 _SIDE_KEPT: Final = 1.5  # s
 
 
@@ -74,8 +73,8 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
 def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
-    Where not all team-mates have a place in the observation, an echo from a slot is attributed to
-    one of them, moving with the formation.
+    Where not all team-mates have a place in the observation and there are no obstacles, an echo from a slot is
+    attributed to one of them, moving with the formation.
     """
     for k in range(len(team.slots)):
         arm = team.slots[k] * me.frame
@@ -104,9 +103,9 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
                 discs[count - 1].turn = turn
     for j in range(len(mates)):
         mate = mates[j]
-        age = since(team, me, mate.step)
-        if mate.step < 0 or age > _FORGOTTEN:
+        if mate.step < 0:
             continue
+        age = since(team, me, mate.step)
         way, velocity = mate.place - me.position, complex(mate.velocity) if age <= me.patience else 0j
         # If it were still there after a silence, it would have a place in the observation.
         if not (world.unlisted and age > me.patience and length(way) < me.horizon):
@@ -114,7 +113,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
             count = put_near(discs, count, way, velocity, two, margin)
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
-    strangers = me.known != 0 and world.unlisted != 0
+    strangers = me.known != 0 and world.strangers != 0
     if not strangers or is_due(team, me, _TAKEN_TIME):
         me.taken = np.uint64(0)
     heading = me.heading * me.turned.conjugate()

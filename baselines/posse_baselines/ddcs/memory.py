@@ -89,6 +89,8 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         sight=_F(sight),  # how far its target sensor reaches, m
         # 1: more team-mates than places in an observation
         unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),
+        # 1: what the sonar detects in a slot is one of these, not an obstacle
+        strangers=_I(scenario.neighbours < scenario.num_trackers - 1 and scenario.num_obstacles == 0),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m
         inner_y=_F(_inner(half_height, sight)),  # half its height

@@ -24,12 +24,10 @@ _MESSAGE_STEP: Final = 1.0 / 512.0
 _PART: Final = 0.45  # of a step; where poses drift, a number carries a measure beside its whole number
 _FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
-_JUMP: Final = 1.0  # m; a fix farther than this from the estimate replaces it
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
 _MEAN_MEMORY: Final = 6.0  # s; time constant of the target's mean velocity
 _LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
 _GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
-_UNSEEN_MEMORY: Final = 2.5  # s; timeout of team-mates that may have had no place in the observation
 
 
 @compiled
@@ -201,8 +199,7 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
             share = 1.0 - math.exp(-time / settings.speed_memory) if me.speed_known else 1.0
             me.target_speed = clip(me.target_speed + share * (along - me.target_speed), 0.0, me.max_speed)
             me.speed_known = 1
-        error = position - guess
-        me.fix = guess + scaled(error, settings.fix_trust if length(error) <= _JUMP else 1.0)
+        me.fix = guess + scaled(position - guess, settings.fix_trust)
         me.target_mean += scaled(vector(me.target_speed, theta) - me.target_mean, 1.0 - math.exp(-time / _MEAN_MEMORY))
     me.raw, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
 
@@ -258,6 +255,6 @@ def place_mates(team: Team, me: Record, mates: Records) -> None:
         mate.place = mate.position
         if silence <= me.patience:
             mate.place = mate.position + scaled(mate.velocity, silence + team.world.lead)
-        mate.there = mate.step >= 0 and silence <= (_UNSEEN_MEMORY if team.world.unlisted else me.patience)
+        mate.there = mate.step >= 0 and silence <= me.patience
         me.others += mate.there
     mates[me.number].place = me.position

@@ -286,8 +286,7 @@ def follow(team: Team, me: Record, mates: Records) -> None:
 def explore(team: Team, me: Record, mates: Records) -> complex:
     """Return the velocity (m/s) of a tracker that searches: ahead, away from team-mates and from the borders.
 
-    One that hears no other is drawn to the middle, where a report is likely heard. On the open plane a lost target is
-    searched for around its predicted position.
+    On the open plane a lost target is searched for around its predicted position.
     """
     world, settings = team.world, team.settings
     off = me.position - (me.target if world.walled == 0 and me.fix_step >= 0 else 0j)
@@ -296,6 +295,4 @@ def explore(team: Team, me: Record, mates: Records) -> complex:
     for j in range(len(mates)):
         if mates[j].there:
             way += push_from(mates[j].place - me.position, settings.apart)
-    if me.others == 0 and settings.radio and team.at.neighbours > 0:
-        way -= unit(off)
     return scaled(unit(way), me.max_speed)

@@ -13,8 +13,7 @@ group. The leader counts its steps in its message, and the others relay the high
 away know that the leader is alive.
 
 **Slots.** Each tracker assigns all known trackers and takes its own slot. Trackers with equal knowledge get equal
-results. Otherwise, for example after lost messages, slots claimed in messages are respected (``loyalty``), and of two
-trackers that claim one slot the nearer one keeps it.
+results. Otherwise, for example after lost messages, slots claimed in messages are respected (``loyalty``).
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ from posse_baselines.laws.geometry import dot, length, unit
 from posse_baselines.laws.steering import Work, assign, intercept_time
 
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
-_EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
 _TAKEN_COST: Final = 8.0  # s; cost of a slot in which the sonar detects a robot that is not heard
 _RESERVED: Final = 1e4  # s; cost of a slot claimed by another
 _HALF_TURN: Final = 0.25 * math.pi  # of the turning time, per 1 - cos
@@ -160,25 +158,4 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
                 time += _RESERVED
             cost[j, k] = time + 1e-4 * j
     assign(cost, work.assigning)
-    slot = int(work.assigning[0, me.number])
-    if me.slot == slot and has_precedence(team, me, mates):
-        cost[me.number, slot] = _RESERVED
-        assign(cost, work.assigning)
     me.slot = int(work.assigning[0, me.number])
-
-
-@compiled
-def has_precedence(team: Team, me: Record, mates: Records) -> bool:
-    """Return whether a team-mate that claims the own slot has precedence over this tracker.
-
-    The nearer one has; for equal distances the lower number. Both trackers get the same result,
-    whatever else they know.
-    """
-    place = me.target + team.slots[me.slot] * me.frame
-    mine = length(place - me.position)
-    for j in range(len(mates)):
-        if mates[j].slot == me.slot and mates[j].there:
-            other = length(place - mates[j].place)
-            if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
-                return True
-    return False
