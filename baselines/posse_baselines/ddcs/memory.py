@@ -73,6 +73,7 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
     delay = scenario.command_delay if foreseen else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
     sight = min(scenario.sensing_range / unit, _MOST_SIGHT)
+    unlisted = scenario.neighbours < scenario.num_trackers - 1
     return record(
         dt=dt,  # control step, s
         delay=_I(delay),  # control steps after which a command is executed
@@ -88,9 +89,9 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         half_height=_F(half_height),
         sight=_F(sight),  # how far its target sensor reaches, m
         # 1: more team-mates than places in an observation
-        unlisted=_I(scenario.neighbours < scenario.num_trackers - 1),
+        unlisted=_I(unlisted),
         # 1: what the sonar detects in a slot is one of these, not an obstacle
-        strangers=_I(scenario.neighbours < scenario.num_trackers - 1 and scenario.num_obstacles == 0),
+        strangers=_I(unlisted and scenario.num_obstacles == 0),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m
         inner_y=_F(_inner(half_height, sight)),  # half its height
