@@ -17,14 +17,12 @@ from posse_baselines.policy import BasePolicy, Memory, PolicyError
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
 _STANDARD: Final = np.array(
     [
-        # ahead, left, gain, foresees
-        (0.0, 0.0, 1.5, 0.0),
-        (-0.2, 0.0, 1.5, 0.0),
-        (0.2, 0.0, 1.5, 0.0),
-        (0.0, 0.0, 0.7, 0.0),
-        (0.0, 0.0, 3.0, 0.0),
-        (0.0, 0.0, 1.5, 1.0),
-        (0.0, 0.0, 3.0, 1.0),
+        # ahead, left, gain
+        (0.0, 0.0, 1.5),
+        (-0.2, 0.0, 1.5),
+        (0.2, 0.0, 1.5),
+        (0.0, 0.0, 0.7),
+        (0.0, 0.0, 3.0),
     ],
     WAY,
 )
@@ -46,7 +44,7 @@ class PlannerSettings:
     """How far each try is played ahead."""
     keep: float = number(0.5, "s", 0.01, 20.0)
     """How long the best is kept before the next planning."""
-    rounds: int = number(2, "", 0, 20)
+    rounds: int = number(6, "", 0, 20)
     """Rounds of variations on the best so far, after the standard ways of playing."""
 
     def __post_init__(self) -> None:
@@ -73,7 +71,7 @@ class Search(OwnArrays):
         self.settings, self.batch = settings, batch
         dt, n = batch.scenario.control_step, batch.scenario.num_trackers
         self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))
-        self.teams = teams_of(batch.scenario, np.full((batch.num_worlds, n), _STANDARD[0]), self._steps + 1)
+        self.teams = teams_of(batch.scenario, np.full((batch.num_worlds, n), _STANDARD[0]))
         self._copies: Batch | None = None
         self._later: Batch | None = None
         # Variations are drawn once, so that what is tried in a world does not depend on the others.
@@ -81,13 +79,11 @@ class Search(OwnArrays):
         shape = (_REPEAT, settings.rounds, _TRIES - 1, n)
         self._changed = rng.random(shape) < _VARIED
         self._shifts = {name: _SPREAD * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()}
-        self._foresees = rng.random(shape) < 0.5
 
     def restart(self, mask: BoolArray) -> None:
         """Forget what was planned for the worlds of a mask (E,)."""
         self.teams.ways[mask] = _STANDARD[0]
         self.teams.plans[mask] = PLAN
-        self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:
         """Plan in the worlds where it is due; return the actions (E, rows, 2 + m) for the present state."""
@@ -120,14 +116,12 @@ class Search(OwnArrays):
             self._copies = worlds.copies(_TRIES, seed=_SEED, alike=True, into=self._copies)
             plans = np.repeat(teams.plans, _TRIES, axis=0)
             trying = teams._replace(ways=np.ascontiguousarray(tries.reshape(-1, tries.shape[2])), plans=plans)
-            worth, paths = play_ahead(trying, self._copies, self._steps)
+            worth = play_ahead(trying, self._copies, self._steps)
             best = worth.reshape(num_worlds, _TRIES).argmax(axis=1)
             ways = tries[everyone, best]
             if turn < self.settings.rounds:
                 tries = self._vary(ways, planning, turn)
         teams.ways[due] = ways[due]
-        teams.paths[due] = paths[everyone * _TRIES + best][due]
-        teams.begun[due] = worlds.worlds["step"][due]
 
     def _vary(self, best: Records, planning: npt.NDArray[np.int64], turn: int) -> Records:
         """Return the best ways (E, N) and variations on them, (E, tries, N).
@@ -140,14 +134,12 @@ class Search(OwnArrays):
         for name, (low, high) in _RANGES.items():
             new = np.clip(varied[name] + self._shifts[name][drawn], low, high)
             varied[name] = np.where(changed, new, varied[name])
-        varied["foresees"] = np.where(changed, self._foresees[drawn], varied["foresees"])
         return tries
 
 
-def play_ahead(teams: Teams, copies: Batch, steps: int) -> tuple[npt.NDArray[np.float64], FloatArray]:
-    """Play copies ahead, with commands that act at once; return the worth of each, (C,), and the target's path.
+def play_ahead(teams: Teams, copies: Batch, steps: int) -> npt.NDArray[np.float64]:
+    """Play copies ahead, with commands that act at once; return the worth of each, (C,).
 
-    The path is (C, steps + 1, 4).
     The worth is the sum of the scores up to the first contact from now on, less a price for that
     contact that no score outweighs, less the trackers' mean distance (m) from free slots in the end.
     """
@@ -156,23 +148,20 @@ def play_ahead(teams: Teams, copies: Batch, steps: int) -> tuple[npt.NDArray[np.
     for name in _CONTACTS:
         world[name] = 0  # those before now are the same for all
     worth = np.zeros(copies.num_worlds)
-    paths = np.empty((copies.num_worlds, steps + 1, 4), np.float32)
     actions = actions_of_target(copies)
     going = np.asarray(world["over"] == 0)
-    paths[:, 0] = _pose_of_target(world)
-    for step in range(1, steps + 1):
+    for _ in range(steps):
         drive(teams, copies, going, actions)
         if s.command_delay:  # in the place of the command that is due
             due = world["step"] % s.command_delay
             copies.arrays.command[np.arange(len(world)), due] = actions[:, : s.num_trackers, :2]
         _, _, terminated, truncated, infos = copies.step(actions)
-        paths[:, step] = _pose_of_target(world)
         touched = going & (world[_CONTACTS[0]] + world[_CONTACTS[1]] + world[_CONTACTS[2]] > 0)
         going &= ~touched
         worth += np.where(going, infos["score"], 0.0) - 2.0 * steps * touched
         going &= ~(terminated | truncated)
     away = copies.arrays.tracker["slot_distance"].mean(axis=1)
-    return worth - np.where(going, away, 0.0), paths
+    return np.asarray(worth - np.where(going, away, 0.0))
 
 
 def actions_of_target(batch: Batch) -> FloatArray:
@@ -183,10 +172,6 @@ def actions_of_target(batch: Batch) -> FloatArray:
         actions[:, -1, 0] = np.clip(2.0 * world["speed"] / s.target_speed - 1.0, -1.0, 1.0)
         actions[:, -1, 1] = np.clip(world["turn_rate"] / s.target_turn_rate, -1.0, 1.0)
     return actions
-
-
-def _pose_of_target(world: Records) -> FloatArray:
-    return np.stack([world["x"], world["y"], world["frame_cos"], world["frame_sin"]], axis=-1)
 
 
 class Planner(BasePolicy):

@@ -1,7 +1,7 @@
 """The law that the planner plays: slots by least total time, courses that meet them, the safeguard.
 
-It reads the state of the worlds (poses, the slot frame, obstacles) and the path on which the target was foreseen. What
-it leaves open for each tracker is a :data:`WAY`. :func:`drive` plays it in any batch of worlds.
+It reads the state of the worlds: poses, the slot frame, obstacles. What it leaves open for each tracker is a
+:data:`WAY`. :func:`drive` plays it in any batch of worlds.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER, config_record, slot_records
 from posse_baselines.ddcs.memory import record
-from posse_baselines.laws.geometry import angle_of, dot, length, wrap
+from posse_baselines.laws.geometry import angle_of, dot, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
 from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
 from posse_baselines.laws.steering import (
@@ -34,17 +34,11 @@ _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
 _TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 _CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
 _MARGIN: Final = 0.15  # m; free width that is kept; twice as much to the target
-_SOON: Final = 0.3  # s; a slot met sooner is followed as it moves now
-_FARTHEST: Final = 20.0  # s; later meetings are as good as this one
-_MET: Final = 0.02  # m
-_LEAST_STEP: Final = 0.01  # s
-_MOST_STEPS: Final = 40
 
 WAY: Final = record_type(
     ("ahead", np.float64),  # shift of the slot along the target's heading, m
     ("left", np.float64),  # shift of the slot to its left, m
     ("gain", np.float64),  # of the slot law, 1/s
-    ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
 )
 """How one tracker plays."""
 
@@ -69,11 +63,6 @@ class Teams(NamedTuple):
     """(E, N) :data:`PLAN`, brought up to date by :func:`drive`."""
     late: FloatArray
     """(N,) s; by how much a slot is taken to be reached later than it is, so that others are filled before it."""
-    paths: FloatArray
-    """(P, T, 4) x, y of the target, cosine and sine of the slot frame at each step, where it was foreseen. The E / P
-    copies of a world share a path."""
-    begun: npt.NDArray[np.int64]
-    """(P,) control step at which each path begins; -1: there is none."""
     work: Work
 
 
@@ -87,20 +76,16 @@ class Scene(NamedTuple):
     obstacles: Records
     ways: Records
     plans: Records
-    path: FloatArray
-    since: int
-    """Control steps since the path began; -1: there is none."""
     frame_rate: float
     """Turn rate of the slot frame, rad/s."""
 
 
-def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
-    """Return teams that play ways (E, N) and have no slots yet and no path foreseen, of up to so many positions."""
-    num_worlds, n = ways.shape
-    paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
+def teams_of(scenario: Scenario, ways: Records) -> Teams:
+    """Return teams that play ways (E, N) and have no slots yet."""
+    n = ways.shape[1]
     plans, late = np.full(ways.shape, PLAN), np.zeros(n, np.float32)
     slots = np.array([complex(slot.x, slot.y) for slot in slot_records(scenario)], np.complex64)
-    return Teams(config_record(scenario), slots, ways, plans, late, paths, begun, work_for(n))
+    return Teams(config_record(scenario), slots, ways, plans, late, work_for(n))
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
@@ -121,41 +106,6 @@ def arm_of(scene: Scene, slot: complex) -> complex:
 
 
 @compiled
-def foreseen(path: FloatArray, at: float, slot: complex) -> complex:
-    """Return where a slot will be, m, ``at`` control steps along a path.
-
-    The path (T, 4) is the target's x, y and the slot frame's cosine and sine at each step; beyond
-    its end the target goes straight on.
-    """
-    k = min(int(at), path.shape[0] - 2)
-    share = at - k
-    turned = min(share, 1.0)
-    c = path[k, 2] + turned * (path[k + 1, 2] - path[k, 2])
-    s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
-    x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
-    y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
-    return complex(x, y) + slot * complex(c, s)
-
-
-@compiled
-def arrival_time(scene: Scene, i: int, slot: complex) -> float:
-    """Return when tracker i can be in a slot on the foreseen path, straight on at full speed, s from now.
-
-    A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds
-    the time that is left from below.
-    """
-    t, dt = scene.trackers[i], scene.config.control_step
-    max_speed = float(t.max_speed)
-    time = 0.0
-    for _ in range(_MOST_STEPS):
-        gap = length(foreseen(scene.path, float(scene.since) + time / dt, slot) - complex(t.x, t.y)) - max_speed * time
-        if gap <= _MET or time > _FARTHEST:
-            break
-        time += max(0.5 * gap / max_speed, _LEAST_STEP)
-    return time
-
-
-@compiled
 def assign_slots(scene: Scene, work: Work) -> None:
     """Assign the working trackers to slots with the least total arrival time."""
     w, plans, n = scene.world, scene.plans, scene.config.num_trackers
@@ -167,10 +117,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
         for k in range(n):
             slot = scene.teams.slots[k]
             way = complex(w.x, w.y) + arm_of(scene, slot) - complex(t.x, t.y)
-            if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene, i, slot)
-            else:
-                time = intercept_time(way, velocity_of(w), float(t.max_speed))
+            time = intercept_time(way, velocity_of(w), float(t.max_speed))
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
             time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
@@ -211,15 +158,8 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     w, t, way, place = scene.world, scene.trackers[i], scene.ways[i], scene.teams.slots[scene.plans[i].slot]
     arm, start = arm_of(scene, place), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
-    time = arrival_time(scene, i, place) if scene.since >= 0 and way.foresees > 0.0 else 0.0
-    if time > _SOON:
-        there = foreseen(scene.path, scene.since + time / scene.config.control_step, place)
-        moved = there - complex(w.x, w.y) - arm
-        velocity = complex(moved.real / time, moved.imag / time)
-        goal = way_round(start, arm, _CLEARANCE) + shift
-    else:
-        velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
-        goal = way_round(start, arm + shift, _CLEARANCE)
+    velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
+    goal = way_round(start, arm + shift, _CLEARANCE)
     return approach_velocity(goal - start, velocity, way.gain, float(t.max_speed), acceleration)
 
 
@@ -263,11 +203,9 @@ def drive_all(
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
     w = teams.work
     work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
-    copies = len(going) // len(teams.begun)
     for e in range(first, end):
         if going[e]:
-            config, world, shared = teams.config[0], worlds.world[e], e // copies
-            begun = teams.begun[shared]
+            config, world = teams.config[0], worlds.world[e]
             scene = Scene(
                 teams,
                 config,
@@ -276,8 +214,6 @@ def drive_all(
                 worlds.obstacle[e],
                 teams.ways[e],
                 teams.plans[e],
-                teams.paths[shared],
-                world.step - begun if 0 <= begun <= world.step else -1,
                 frame_rate_of(config, world),
             )
             drive_team(scene, work, actions[e])
