@@ -1,17 +1,13 @@
-"""The adapter: slots are trackers, last observations are last, truncation is bootstrapped."""
+"""The adapter: slots are trackers, last observations are last, truncation is told."""
 
 from typing import Any
 
 import numpy as np
 import pytest
-import torch
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 
 import posse
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.safeguard import Guard
-from posse_training.train.networks import Normaliser
 from posse_training.train.vec_env import TeamVecEnv
 
 HORIZON = 12
@@ -161,53 +157,3 @@ def test_invalid_batches_are_refused(batches: list[dict[str, Any]], message: str
     layout = posse.ObservationLayout(posse.get_scenario("constant"))
     with pytest.raises(ValueError, match=message):
         TeamVecEnv(made, Encoding.of(layout))
-
-
-class _Recorder(BaseCallback):
-    """Keeps the environment's results before the learner modifies them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.rewards: list[Any] = []
-        self.finals: list[dict[int, Any]] = []
-
-    def _on_step(self) -> bool:
-        infos = self.locals["infos"]
-        self.rewards.append(self.locals["rewards"].copy())
-        self.finals.append({s: i["terminal_observation"] for s, i in enumerate(infos) if i.get("TimeLimit.truncated")})
-        return True
-
-
-def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
-    """Without a trace, an advantage is the difference of one step."""
-    discount, steps = 0.9, 3 * HORIZON
-    env = make(staggered=True)
-    model = PPO(
-        "MlpPolicy",
-        env,
-        n_steps=steps,
-        batch_size=steps * env.num_envs,
-        gamma=discount,
-        gae_lambda=0.0,
-        seed=0,
-        device="cpu",
-        policy_kwargs={"features_extractor_class": Normaliser},
-    )
-    recorder = _Recorder()
-    _, callback = model._setup_learn(steps, recorder)
-    model.collect_rollouts(env, callback, model.rollout_buffer, steps)
-
-    def value(rows: Any) -> Any:
-        with torch.no_grad():
-            return model.policy.predict_values(torch.as_tensor(rows)).numpy().reshape(-1)
-
-    buffer = model.rollout_buffer
-    values = np.stack([value(rows) for rows in buffer.observations])
-    following = np.concatenate([values[1:], value(model._last_obs)[None]])
-    for step, ends in enumerate(recorder.finals):
-        for slot, final in ends.items():  # the value of where it truly was, not of the next episode's start
-            following[step, slot] = value(final[None])[0]
-    assert sum(map(len, recorder.finals)) >= 2 * env.num_envs
-    advantages = np.array(recorder.rewards) + discount * following - values
-    np.testing.assert_allclose(buffer.advantages, advantages, rtol=1e-4, atol=2e-4)
-    np.testing.assert_allclose(buffer.returns, advantages + values, rtol=1e-4, atol=2e-4)
