@@ -44,7 +44,7 @@ class PlannerSettings:
     """How far each try is played ahead."""
     keep: float = number(0.5, "s", 0.01, 20.0)
     """How long the best is kept before the next planning."""
-    rounds: int = number(2, "", 0, 20)
+    rounds: int = number(4, "", 0, 20)
     """Rounds of variations on the best so far, after the standard ways of playing."""
 
     def __post_init__(self) -> None:
