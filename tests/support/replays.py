@@ -19,7 +19,7 @@ ATTACK: Final = (
 def short(scenario: str = "field") -> Replay:
     """Two players on one world with every kind of fault and noise, in which the first has a contact, 20 s."""
     policies = ["ddcs-distributed", "pursuit"]
-    return record(policies, scenario, seed=4, world=6, seconds=20, observations=True, num_trackers=4)
+    return record(policies, scenario, seed=4, world=81, seconds=20, observations=True, num_trackers=4)
 
 
 @cache
