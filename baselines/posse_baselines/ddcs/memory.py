@@ -90,7 +90,7 @@ def constants_of(scenario: Scenario, settings: Settings) -> Records:
         sight=_F(sight),  # how far its target sensor reaches, m
         # 1: more team-mates than places in an observation
         unlisted=_I(unlisted),
-        # 1: what the sonar detects in a slot is one of these, not an obstacle
+        # 1: what the sonar detects in a slot is a team-mate without a place: there are no obstacles
         strangers=_I(unlisted and scenario.num_obstacles == 0),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m

@@ -20,7 +20,7 @@ from posse.numeric.lanes import WIDTH
 MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Number of cores available to the process."""
 _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
-_LEAST_SHARE: Final = 16 * WIDTH  # worlds; to step them takes ten times as long as a call
+_LEAST_SHARE: Final = 16 * WIDTH  # of many worlds; to step them takes ten times as long as a call
 
 
 @functools.cache
@@ -53,9 +53,11 @@ def _shares_of(num_worlds: int, threads: int) -> list[tuple[int, int]]:
     The first is three quarters of a thread's part: a thread that the system interrupts leaves the rest to the others.
     The last is the caller's, so that it ends last: to wake it would take as long as fifty worlds.
     """
-    ends, last = [0], max(0, num_worlds - _LEAST_SHARE) // WIDTH * WIDTH
+    # Shares of few worlds are smaller, or the caller would take them all before another thread begins.
+    least = max(WIDTH, min(_LEAST_SHARE, num_worlds // (4 * threads) // WIDTH * WIDTH))
+    ends, last = [0], max(0, num_worlds - least) // WIDTH * WIDTH
     while ends[-1] < last:
-        share = max(_LEAST_SHARE, 3 * (last - ends[-1]) // (4 * threads) // WIDTH * WIDTH)
+        share = max(least, 3 * (last - ends[-1]) // (4 * threads) // WIDTH * WIDTH)
         ends.append(min(last, ends[-1] + share))
     return list(itertools.pairwise([*ends, num_worlds]))
 
@@ -72,7 +74,7 @@ def over_worlds(
     if threads == 1:
         return [kernel(*arguments, 0, 0, num_worlds)]
     *before, last = _shares_of(num_worlds, threads)
-    shared, own = iter(before), iter([last])  # all threads take from the first
+    shared, own = iter(before), iter([last])  # all threads take from what is shared
     results: list[Any] = []
     errors: list[BaseException] = []
     turns = [threading.RLock() for _ in range(threads)]  # each is held by its thread, in the end by the caller
