@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 import posse
 from posse import Batch, ObservationLayout, PairedBatch, Scenario
+from posse.engine.arguments import check_count
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
 from posse_baselines.registry import Target
@@ -173,7 +174,8 @@ class Recorder:
                 self._rows[name].append(row)
 
     def trajectory(self) -> Trajectory:
-        """Return what was recorded since the reset."""
+        """Return what was recorded since the reset; ResetNeeded before the first one."""
+        self.batch.check_started("trajectory")
         now = {name: np.array(values, np.float64) for name, values in self.batch.metrics().items()}
         for name, values in self._metrics.items():
             now[name][self.over] = values[self.over]
@@ -253,8 +255,8 @@ def rollout(
             different steps with autoreset disabled.
         ValueError: An unknown name to record, or ``steps`` below 1.
     """
-    if steps is not None and steps < 1:
-        raise ValueError(f"steps={steps} must be at least 1")
+    if steps is not None:
+        steps = check_count("steps", steps, 1)
     _check_target_moves(policy, batch)
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)

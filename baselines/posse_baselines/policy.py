@@ -117,7 +117,12 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy for a batch; a policy with ``reads_state = True`` first gets the batch."""
+    """Return the memory of a policy for a batch; a policy with ``reads_state = True`` first gets the batch.
+
+    A TypeError says that something is no policy, such as a name.
+    """
+    if not isinstance(policy, Policy):
+        raise TypeError(f"{policy!r:.100} is not a policy: load() returns that of a name or a file")
     if policy.reads_state and hasattr(policy, "watch"):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
@@ -151,12 +156,13 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the function's actions, (E, N, 2 + m), and the memory; PolicyError if they have another shape."""
         found = np.asarray(self._function(observations))
-        numbered = self._discrete and found.dtype.kind in "iu"
+        numbered = self._discrete and found.dtype.kind in "iu" and bool(((found >= 0) & (found < len(MOTIONS))).all())
         chosen = MOTIONS[found] if numbered else found
         team, length = observations.shape[:2], 2 + memory.scenario.message_size
         fits = chosen.ndim == 3 and chosen.shape[:2] == team and 2 <= chosen.shape[2] <= length
         if numbered != self._discrete or not fits:
-            wanted = f"{team} of whole numbers" if self._discrete else f"{(*team, length)}, or without the message"
+            numbers = f"{team} of whole numbers from 0 to {len(MOTIONS) - 1}"
+            wanted = numbers if self._discrete else f"{(*team, length)}, or without the message"
             raise PolicyError(
                 f"the function of policy {self.name!r} returned actions of shape {found.shape} "
                 f"({found.dtype}), wanted {wanted}"

@@ -22,6 +22,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
+from posse.engine.arguments import as_float32, in_box
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
 from posse_baselines.ddcs.memory import Minds
@@ -42,14 +43,17 @@ class Guard(Minds):
         scenario = layout.scenario
         super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
 
-    def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
+    def actions(self, observations: FloatArray, wanted: npt.ArrayLike, clip: bool = False) -> FloatArray:
+        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
 
-        Call it once a control step, with its observations (E, R, F); ValueError if a wanted velocity is not finite.
+        Call it once a control step, with its observations (E, R, F). ValueError if the shape is another, or a number
+        is not in [-1, 1]; with ``clip``, it has to be finite.
         """
-        actions = np.array(wanted, np.float32, order="C")
-        if not np.isfinite(actions).all():
-            raise ValueError("a wanted velocity must be finite")
+        name = "the array of wanted velocities"
+        actions = as_float32(name, wanted).copy()
+        if actions.ndim != 3 or actions.shape[:2] != self.me.shape or actions.shape[2] < 2:
+            raise ValueError(f"{name} has shape {actions.shape}, wanted {(*self.me.shape, 2)} or with the message")
+        actions = in_box(actions, clip, f"{name}[{{}}, {{}}, {{}}]".format)
         self.run(guard_all, check_observations("safeguard", observations, self.me.shape, self.layout), actions)
         return actions
 
@@ -65,11 +69,11 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         PolicyError: Discrete actions, which are no velocities.
         TypeError: Something else.
     """
-    if isinstance(env, ParallelEnv):
+    if isinstance(env, ParallelEnv) and hasattr(env.unwrapped, "layout"):
         return _GuardedParallelEnv(env)
-    if isinstance(env, gymnasium.Env):
+    if isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
         return _GuardedEnv(env)
-    raise TypeError(f"{env!r:.80} is neither a parallel environment of PettingZoo nor an environment of Gymnasium")
+    raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
 
 
 def _check_continuous(space: spaces.Space[Any]) -> None:
@@ -83,6 +87,7 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
         _check_continuous(env.action_space)
+        self._guard: Guard | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
@@ -93,8 +98,11 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Advance by one control step with wanted velocities."""
+        if self._guard is None:
+            return self.env.step(action)  # which refuses it
         wanted = np.asarray(action, np.float32)
-        motion = self._guard.actions(self._seen, np.array(wanted, ndmin=3))
+        clip = self.get_wrapper_attr("batch").clip_actions
+        motion = self._guard.actions(self._seen, np.array(wanted, ndmin=3), clip)
         observation, *rest = self.env.step(motion.reshape(wanted.shape))
         self._seen = np.array(observation, ndmin=3)
         return observation, *rest
@@ -107,6 +115,7 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
         super().__init__(env)
         for agent in env.possible_agents:
             _check_continuous(env.action_space(agent))
+        self._guard: Guard | None = None
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
@@ -116,7 +125,9 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        motions = self._guard.actions(self._seen, stack_agents(actions))
+        if self._guard is None or not self.env.agents:
+            return self.env.step(actions)  # which refuses them
+        motions = self._guard.actions(self._seen, stack_agents(actions), self.env.unwrapped.batch.clip_actions)
         result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **split_agents(motions, actions)})
         self._seen = stack_agents(result[0])
         return result

@@ -230,8 +230,10 @@ class FieldDeclaration(Declaration):
     when: Callable[[Any], bool] | None = None
 
     def __post_init__(self) -> None:
-        """Raise DeclarationError also if the size is invalid."""
+        """Raise DeclarationError also if the size is invalid, or the name is one of posse's own."""
         super().__post_init__()
+        if self.name in ("sonar", "neighbour_message"):  # whose size depends on the scenario: they are not declared
+            raise self.error(f"the name {self.name!r} is taken by posse")
         if type(self.size) is not int or not 1 <= self.size <= MOST_NUMBERS:
             raise self.error(f"size={self.size!r} must be a whole number from 1 to {MOST_NUMBERS}")
 
@@ -360,7 +362,10 @@ class Metric(Declaration):
     def of(self, scenario: Any, worlds: Records) -> npt.NDArray[np.float64]:
         """Return the metric of the current episodes, (E,)."""
         if not self.summed:
-            return np.asarray(self.function(scenario, worlds), np.float64)
+            found = np.asarray(self.function(scenario, worlds), np.float64)
+            if found.shape != worlds.shape:
+                raise self.error(f"it returned an array of shape {found.shape}, not {worlds.shape}, one for each world")
+            return found
         total: npt.NDArray[np.float64] = np.asarray(worlds[self.sum_name], np.float64)
         steps = _STEPS[self.per]
         return total if steps is None else total / np.maximum(worlds[steps], 1)

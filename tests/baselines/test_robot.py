@@ -84,6 +84,14 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
     assert np.mean(alike) > 0.97
 
 
+def test_what_is_older_than_the_first_observation_counts_as_of_then() -> None:
+    robot, ages = Robot("constant", 0), []
+    for _ in range(6):
+        row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(3.0, 0.0, 0.0, age=0.3))
+        ages.append(float(robot.layout.views(row)["target_age"]))
+    assert ages == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.3, 0.3])
+
+
 def test_invalid_measurements_are_refused() -> None:
     robot = Robot("field", 1)
     beams = robot.scenario.sonar_beams
@@ -105,8 +113,9 @@ def test_invalid_measurements_are_refused() -> None:
     np.testing.assert_array_equal(robot.observe((0.0, 0.0, 0.0), 0.1, 0.0), before)
     with pytest.raises(ValueError, match=r"\[-1, 1\]"):
         robot.command((0.0, 1.5))
-    with pytest.raises(ValueError, match="number=9"):
-        Robot("field", 9)
+    for number in (9, 1.5):
+        with pytest.raises(ValueError, match=f"number={number}"):
+            Robot("field", number)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="scale=0"):
         Robot("field", 0, scale=0)
     with pytest.raises(ScenarioError, match="unknown"):

@@ -154,11 +154,17 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))
-    with pytest.raises(TypeError, match="neither"):
-        Safeguard(3)
+    for other in (3, gymnasium.make("Pendulum-v1")):
+        with pytest.raises(TypeError, match="no environment of posse"):
+            Safeguard(other)
+    for env in (Safeguard(gymnasium.make("posse/Team-v0")), Safeguard(posse.parallel_env())):
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            env.step({})
     batch = posse.batch("smart", 1)
-    with pytest.raises(ValueError, match="finite"):
-        Guard(batch.layout, 1).actions(batch.reset(), np.full((1, 5, 2), np.nan))
+    guard, seen = Guard(batch.layout, 1), batch.reset()
+    for wrong, words in ((np.full((1, 5, 2), np.nan), "nan"), (np.full((1, 5, 2), 1.5), "1.5"), (np.ones(2), "shape")):
+        with pytest.raises(ValueError, match=words):
+            guard.actions(seen, wrong)
 
 
 @pytest.mark.parametrize("turn", [1.5, 0.0, -1.5])

@@ -29,10 +29,35 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
     assert info["metrics/score"] == pytest.approx(float(infos["metrics/score"][0]))
 
 
+def test_a_planner_plays_the_team_mates_and_a_number_of_numpy_is_a_tracker() -> None:
+    env = gymnasium.make_vec("posse/Tracker-v0", 2, scenario="smart", teammates="planner", number=np.int64(1), seed=3)
+    env.reset()
+    for _ in range(3):
+        env.step(np.ones((2, 2), np.float32))
+    speeds = env.unwrapped.batch.arrays.tracker["speed"]
+    assert (speeds[:, 1] == 1.0).all()
+    assert speeds[:, 2:].max() > 0.5
+
+
+def test_a_refused_reset_leaves_what_the_team_mates_remember() -> None:
+    observations = []
+    for refused in (False, True):
+        env = TrackerEnv("smart", seed=3)
+        env.reset()
+        for _ in range(12):
+            env.step(np.zeros(2, np.float32))
+        if refused:
+            with pytest.raises(ValueError, match="would start in"):
+                env.reset(options={"tracker_pose": np.zeros((5, 3))})
+        observations.append([env.step(np.zeros(2, np.float32))[0] for _ in range(3)])
+    np.testing.assert_array_equal(*observations)
+
+
 @pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])
 def test_what_cannot_be_played_is_refused(make: Any) -> None:
-    with pytest.raises(ValueError, match="number=5 is not in the team"):
-        make(scenario="constant", number=5)
+    for number, words in ((5, "number=5 is not in the team"), (1.0, "number=1.0 must be a whole number")):
+        with pytest.raises(ValueError, match=words):
+            make(scenario="constant", number=number)
     with pytest.raises(posse.ScenarioError, match="no team-mates"):
         make(scenario="constant", num_trackers=1)
     with pytest.raises(PolicyError, match="unknown policy 'pursiut'"):

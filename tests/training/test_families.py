@@ -20,7 +20,7 @@ OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.
 @settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(0, 10**6), st.sampled_from(["train", "validation", "test"]))
 def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: int, split: str) -> None:
-    family = posse.family("obstacles", num_obstacles=(0, 3), target_speed=(0.3, 0.5))
+    family = posse.family("obstacles", num_obstacles=(np.int64(0), np.int64(3)), target_speed=(0.3, 0.5))
     drawn = family.draw(index, seed, split)
     assert drawn == family.draw(index, seed, split)
     assert drawn.num_obstacles in range(4)
@@ -54,6 +54,7 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
         ({"horizon": (100, 200)}, "cannot vary horizon"),
         ({"target_motion": ("smart", "constant")}, "one number"),
         ({"num_obstacles": (0, 1.5)}, "whole number"),
+        ({"sensing_range": (3.0, np.inf)}, "must be finite"),
     ],
 )
 def test_what_cannot_hold_is_refused(changes: dict[str, Any], message: str) -> None:
@@ -134,3 +135,20 @@ def test_other_ranges_are_drawn_from_for_a_test() -> None:
     fixed = OPEN.replace(target_speed=0.5)
     assert {fixed.draw(k).target_speed for k in range(5)} == {0.5}
     assert [name for name, _ in fixed.ranges] == ["tracker_turn_rate"]
+
+
+def test_worlds_side_by_side_start_from_poses_of_their_own_or_not_at_all() -> None:
+    env = gym.make_vec("posse/Team-v0", 4, scenario=posse.family("obstacles", arena=(18.0, 28.0), num_obstacles=(0, 0)))
+    with pytest.raises(gym.error.ResetNeeded):
+        env.reset(options={"reset_mask": np.array([True, False, False, False])})
+    env.reset(seed=3)
+    poses = np.zeros((4, 5, 3))
+    poses[..., 0], poses[..., 1] = np.arange(5), np.arange(4)[:, None]
+    env.reset(options={"tracker_pose": poses, "target_pose": [-3.0, 0.0, 0.0]})
+    batches = env.unwrapped.batches
+    np.testing.assert_array_equal([batch.arrays.tracker["y"][0, 0] for batch in batches], np.arange(4))
+    poses[..., 0] += 0.5 * min(batch.scenario.arena for batch in batches) - 2.0  # outside the smallest
+    with pytest.raises(ValueError, match="tracker_pose"):
+        env.reset(seed=4, options={"tracker_pose": poses[0]})
+    assert [int(batch.worlds["episode"][0]) for batch in batches] == [1] * 4
+    assert {batch.seed for batch in batches} == {3}

@@ -75,6 +75,8 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert cli.main(["submit", "pursuit", "--out", str(tmp_path)]) == 2
     assert "not an empty folder" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+    assert cli.main(["submit", "pursuit", "--scenario", "family-open", "--out", str(tmp_path / "sent")]) == 2
+    assert not (tmp_path / "sent").exists()
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ import posse
 from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
-from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.evaluation import played_errors, progress_bar
 from posse_training.options import Worlds
 from posse_training.provenance import commit
 
@@ -81,7 +81,7 @@ def record_dataset(
     overrides["message_size"] = max(base.message_size, *(each.message_size for each in players))
     settings = get_scenario(scenario, **overrides)
     name = name or "-and-".join(each.name for each in players)
-    called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_.-]', '-', name)}-v0"
+    called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_.-]|^[.]', '-', name)}-v0"
     folder = Path(out).resolve()  # Minari joins a relative one to itself
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
@@ -131,7 +131,8 @@ def _episode(
     from minari.data_collector import EpisodeBuffer
 
     batch = Batch(settings, 1, **where, first_world=world, autoreset="disabled", num_threads=1)
-    played = rollout(batch, policy, _RECORD)
+    with played_errors():
+        played = rollout(batch, policy, _RECORD)
     terms = {name: np.insert(term[:, 0], 0, 0, axis=0) for name, term in played.named("reward").items()}
     buffer = EpisodeBuffer(
         id=world,

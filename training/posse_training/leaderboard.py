@@ -23,7 +23,7 @@ from posse_baselines import Policy, load, policy_names
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import FILES, is_code
 from posse_training.errors import SettingsError
-from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.evaluation import evaluate, played_errors
 from posse_training.files import check_new
 from posse_training.provenance import commit
 
@@ -142,14 +142,18 @@ def submit(
     Raises:
         SettingsError: An invalid name; nothing is played.
         RunFolderError: A folder that is not empty; nothing is played.
+        ScenarioError: An unknown scenario; nothing is played.
+        PlayError: An error of the policy's own code.
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
+    get_scenario(scenario)  # a family has no standings
     check_new(out)
-    claim = measure(label, text, loaded, scenario, episodes, SEED)
     out.mkdir(parents=True, exist_ok=True)
+    with played_errors():
+        claim = measure(label, text, loaded, scenario, episodes, SEED)
     if is_file:
         write_atomically(out / text, Path(policy).read_bytes())
     write_atomically(out / CLAIM, standings_text([claim]).encode())

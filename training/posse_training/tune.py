@@ -196,13 +196,15 @@ class _Run:
             with intact(state):
                 kept = read_json(state)
                 self.scores, self.curve, self.seconds = (kept[name] for name in _KEPT)
+        since = time.monotonic() - self.seconds
+        if not s.only:
+            self.console.print(f"looking which of {len(self.tunables)} settings have an effect")
         space = Space(self.tunables, s.only or self._effective())
         if not space.names:
             raise SettingsError(f"no setting of {s.policy!r} has an effect on {s.scenario!r}")
         self.console.print(f"searching {len(space.names)} settings: {', '.join(space.names)}", markup=False)
         if self.scores:
             self.console.print(f"resuming after generation {len(self.scores)}")
-        since = time.monotonic() - self.seconds
         bounds = np.tile([0.0, 1.0], (len(space.names), 1))
         cma = CMA(mean=space.start, sigma=SIGMA, bounds=bounds, seed=s.seed, population_size=s.population)
         for generation in range(len(self.scores)):  # the search draws again what it drew then

@@ -167,7 +167,8 @@ def play_ahead(teams: Teams, copies: Batch, steps: int) -> npt.NDArray[np.float6
 def actions_of_target(batch: Batch) -> FloatArray:
     """Return actions (E, rows, 2 + m) in which a target that is an agent goes on as it moves now."""
     s, world = batch.scenario, batch.arrays.world
-    actions = np.zeros(batch.action_shape, np.float32)
+    # A paired batch has actions of its outside alone.
+    actions = np.zeros((batch.num_worlds, s.num_agents, 2 + s.message_size), np.float32)
     if s.target_is_agent:
         actions[:, -1, 0] = np.clip(2.0 * world["speed"] / s.target_speed - 1.0, -1.0, 1.0)
         actions[:, -1, 1] = np.clip(world["turn_rate"] / s.target_turn_rate, -1.0, 1.0)

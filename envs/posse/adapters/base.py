@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,9 @@ from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.signals.layout import ObservationLayout, StateLayout
+
+_POSES: Final = {"tracker_pose": 3, "target_pose": 2}
+"""Options of a reset, and how many axes they have where each world has its own."""
 
 
 def joined(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
@@ -109,10 +112,22 @@ class BatchEnv:
             seed = secrets.randbits(32)
         given = options_of(options)
         masks = self._split(mask_of(given, sum(batch.num_worlds for batch in self.batches)))
-        observations = [
-            batch.reset(seed=seed, options={**given, "reset_mask": mask})
-            for batch, mask in zip(self.batches, masks, strict=True)
-        ]
+        parts = [{**given, "reset_mask": mask} for mask in masks]
+        for name, axes in _POSES.items() if len(parts) > 1 else ():
+            if np.ndim(given.get(name)) == axes:  # of every world
+                for part, poses in zip(parts, self._split(np.asarray(given[name])), strict=True):
+                    part[name] = poses
+        # Of several batches, which are restored if one refuses; a single one restores itself.
+        before = [{**vars(batch), "arrays": batch.arrays.copy()} for batch in self.batches if len(parts) > 1]
+        try:
+            observations = [
+                batch.reset(seed=seed, options=part) for batch, part in zip(self.batches, parts, strict=True)
+            ]
+        except BaseException:
+            for batch, old in zip(self.batches, before, strict=False):
+                batch.arrays.write(old.pop("arrays"))
+                vars(batch).update(old)
+            raise
         self._seeded = True
         self._show()
         return joined(observations)
@@ -150,6 +165,9 @@ class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
+        for name in ("autoreset", "num_threads"):
+            if name in settings:
+                raise TypeError(f"unexpected keyword argument {name!r}: an environment of one world has none")
         super().__init__([(scenario, range(1))], autoreset="disabled", num_threads=1, **settings)
         self._no_info: dict[str, Any] = dict.fromkeys(self.batch._info, 0.0)
         self._rewards = self.batch._rewards

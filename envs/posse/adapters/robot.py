@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import SENSORS
-from posse.engine.arguments import MOST_ACTION, real_numbers
+from posse.engine.arguments import MOST_ACTION, check_count, real_numbers
 from posse.engine.batch import Batch
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
@@ -96,8 +96,8 @@ class Robot:
         self.scenario = get_scenario(scenario, **overrides)
         if SENSORS[self.scenario.sensor].fix == "bearing":
             raise ScenarioError(f"sensor={self.scenario.sensor!r} gives bearings; a robot needs a sensor of positions")
-        if not 0 <= number < self.scenario.num_trackers:
-            raise ValueError(f"number={number!r} must be from 0 to {self.scenario.num_trackers - 1}, one of the team's")
+        if check_count("number", number, 0) >= self.scenario.num_trackers:
+            raise ValueError(f"number={number} must be from 0 to {self.scenario.num_trackers - 1}, one of the team's")
         if not (math.isfinite(scale) and scale > 0):
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
@@ -142,7 +142,8 @@ class Robot:
                 direction 2πk / S to the left of ahead, π / S to each side. A beam that contains the point of a body
                 nearest to the robot reads the distance of that point; another one, the distance along its axis.
                 Readings beyond ``sonar_range``, or ``None``: nothing is near.
-            heard: What arrived since the last observation. Of each team-mate the last stays, and its age grows.
+            heard: What arrived since the last observation. Of each team-mate the last stays, and its age grows. What is
+                older than the first observation counts as being of that moment.
             touching: Whether it touches a robot, an obstacle or a wall.
 
         Raises:
@@ -163,7 +164,7 @@ class Robot:
         world.step = self.steps
         self._pose = (x, y, heading)
         _place(me, x * self.scale, y * self.scale, heading)
-        me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, touching, fix is not None
+        me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, bool(touching), fix is not None
         if fix is not None:
             self._take(fix)
         for message in messages:
@@ -208,7 +209,10 @@ class Robot:
     def _checked(self, message: Heard) -> Heard:
         _finite("a message heard", (*message[1:6], *message.message), (5 + len(message.message),))
         _check_age(message.age)
-        if not 0 <= message.number < self.scenario.num_trackers or message.number == self.number:
+        if (
+            check_count("heard number", message.number, 0) >= self.scenario.num_trackers
+            or message.number == self.number
+        ):
             raise ValueError(f"heard number={message.number!r}, which is no team-mate of {self.number}")
         if len(message.message) not in (0, self.scenario.message_size):
             raise ValueError(f"heard a message of {len(message.message)}, wanted {self.scenario.message_size} numbers")
@@ -220,7 +224,8 @@ class Robot:
         return fix
 
     def _step_of(self, age: float) -> int:
-        return self.steps - round(age / self.scenario.control_step)
+        """Return the step of a measurement, the first one if it is older."""
+        return max(0, self.steps - round(age / self.scenario.control_step))
 
     def _take(self, fix: TargetFix) -> None:
         """Take a fix, if it is newer than the last one, as a tracker of a world does."""

@@ -203,7 +203,12 @@ class Batch(OwnArrays):
         self.check_started("copies")
         if into is None:
             into = Batch(
-                self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
+                self.scenario,
+                self.num_worlds * count,
+                seed=self.seed,
+                split=self.split,
+                num_threads=self.num_threads,
+                clip_actions=self.clip_actions,
             )
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
@@ -253,8 +258,8 @@ class Batch(OwnArrays):
         before, over, world = self.arrays.copy(), self._over, self.arrays.world
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
-            world["split"] = SPLITS.index(self.split)
-            world["index"] = self.first_world + np.arange(self.num_worlds)
+            world["split"][chosen] = SPLITS.index(self.split)
+            world["index"][chosen] = self.first_world + np.flatnonzero(chosen)
             world["episode"][chosen] = 0
         else:
             world["episode"][chosen] += 1

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from posse.engine.arguments import as_float32, in_box
+from posse.engine.arguments import as_float32, check_choice, check_count, in_box
 from posse.engine.batch import Batch
 from posse.engine.kernels import LOOK, Orders, Results
 from posse.numeric import BoolArray, FloatArray
-from posse.scenarios import Family, Scenario, get_scenario
+from posse.scenarios import Family, Scenario, ScenarioError, get_scenario
 from posse.scenarios.family import scenario_or_family, shares
 from posse.signals.layout import ObservationLayout
 
@@ -75,15 +75,19 @@ class PairedBatch(Batch):
         silent: bool = False,
         **settings: Any,
     ) -> None:
-        one = isinstance(outside, int)
+        one = not isinstance(outside, str)
+        if one and check_count("outside", outside, 0) >= scenario.num_trackers:
+            raise ScenarioError(f"outside={outside} is not in the team: trackers are 0 to {scenario.num_trackers - 1}")
+        if not one:
+            check_choice("outside", outside, ("trackers", "target"))
         super().__init__(scenario if one else scenario.replace(target_motion="agent"), num_worlds, **settings)
         self.inside, self.outside = inside, outside
         self.everyone = np.zeros(self.action_shape, np.float32), self._new_results()
         worlds, rows, length = self.action_shape
         team, target = slice(0, scenario.num_trackers), slice(rows - 1, rows)
         self._mine, self._theirs = (team, target) if outside == "trackers" else (target, team)
-        if isinstance(outside, int):
-            self._mine = slice(outside, outside + 1)
+        if one:
+            self._mine = slice(int(outside), int(outside) + 1)
         mine, theirs = (len(range(rows)[part]) for part in (self._mine, self._theirs))
         self.action_shape = worlds, mine, 2 if silent or outside == "target" else length
         self._their_shape = worlds, theirs, 2 if outside == "trackers" else length
@@ -91,20 +95,21 @@ class PairedBatch(Batch):
         if hasattr(inside, "watch"):
             inside.watch(self)
         self.memory = inside.begin(self.layout, worlds)
+        self._begun = np.zeros(worlds, np.bool_)  # episodes that began since the policy inside acted
 
     @property
     def working(self) -> BoolArray:
         """Whether each tracker that is not moved by the policy inside works, (E, rows); all if the target is not."""
         working = super().working
-        return working[:, self._mine] if isinstance(self.outside, int) else working
+        return working if isinstance(self.outside, str) else working[:, self._mine]
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world; see :meth:`Batch.reset`."""
-        before = self.memory, self.everyone
+        before = self._begun, self.everyone
         try:
             return super().reset(seed=seed, options=options)
         except BaseException:
-            self.memory, self.everyone = before
+            self._begun, self.everyone = before
             raise
 
     def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
@@ -113,23 +118,24 @@ class PairedBatch(Batch):
         If the policy's actions are invalid, neither the worlds nor its memory change.
         """
         if orders is None:
-            restarted, (whole, memory) = self.worlds["over"] != 0, self._with_theirs(actions)
+            whole, self.memory = self._with_theirs(actions)
+            self._begun = self.worlds["over"] != 0
         else:
-            restarted, whole, memory = orders != LOOK, np.zeros_like(self.everyone[0]), self.memory
+            whole, self._begun = np.zeros_like(self.everyone[0]), self._begun | (orders != LOOK)
         observations, rewards, terms = (np.empty_like(array) for array in self.everyone[1][:3])
         every = results._replace(observations=observations, rewards=rewards, terms=terms)
         over = super()._advance(whole, every, orders)
         self.everyone = whole, every
         for mine, array in zip(results[:3], every[:3], strict=True):
             mine[...] = array[:, self._mine]
-        self.memory = self.inside.restart(memory, restarted) if restarted.any() else memory
         return over
 
     def _with_theirs(self, mine: FloatArray) -> tuple[FloatArray, Any]:
         """Return the actions of all robots, and the memory of the policy inside."""
         who = "target's" if self.outside == "trackers" else "team's"
         seen = self.everyone[1].observations[:, self._theirs].copy()
-        chosen, memory = self.inside.act(seen, self.memory)
+        memory = self.inside.restart(self.memory, self._begun) if self._begun.any() else self.memory
+        chosen, memory = self.inside.act(seen, memory)
         array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
@@ -197,6 +203,7 @@ def batches(
     A world depends on seed, split and its number alone; so does scenario k on seed, split and k. The other settings
     are those of :func:`batch`.
     """
+    check_count("num_worlds", num_worlds, 1), check_count("scenarios", scenarios, 1)
     parts = shares(scenario_or_family(scenario), num_worlds, scenarios, seed, split)
     return [
         batch(one, len(part), seed=seed, split=split, first_world=first_world + part.start, **settings)

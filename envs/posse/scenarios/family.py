@@ -54,8 +54,7 @@ class Family:
     def __post_init__(self) -> None:
         if not self.ranges:
             raise ScenarioError(f"family {self.name!r} has no ranges: give one, such as target_speed=(0.3, 0.7)")
-        for name, bounds in self.ranges:
-            _check_range(name, bounds)
+        object.__setattr__(self, "ranges", tuple((name, _accepted(name, bounds)) for name, bounds in self.ranges))
         varied = dict(self.ranges)
         if "num_trackers" in varied and self.base.num_neighbours is None:
             fail(
@@ -105,7 +104,8 @@ class Family:
         return {"family": self.name, "ranges": ranges, **self.base.to_dict()}
 
 
-def _check_range(name: str, bounds: Range) -> None:
+def _accepted(name: str, bounds: Range) -> Range:
+    """Return a range as the setting keeps its values, or raise ScenarioError."""
     known = Scenario.settings()
     if name not in known:
         raise UnknownSettingError(unknown("setting", name, known))
@@ -115,17 +115,17 @@ def _check_range(name: str, bounds: Range) -> None:
         fail(name, bounds, f"a family cannot vary {name}, {_FIXED[name]}: set it on its base")
     if "int" not in known[name].kind and not known[name].kind.startswith("float"):
         fail(name, bounds, "a family varies settings that are one number")
-    for value in bounds:
-        known[name].accept(name, value)
-    if bounds[0] > bounds[1]:
-        fail(name, bounds, "the least must not be above the greatest")
+    low, high = (known[name].accept(name, value) for value in bounds)
+    if not low <= high < math.inf:
+        fail(name, bounds, "the least must not be above the greatest, which must be finite")
+    return low, high
 
 
 def family(base: str | Scenario | Family, /, *, name: str | None = None, **settings: Any) -> Family:
     """Return a family: ``posse.family("smart", target_speed=(0.3, 0.7), num_obstacles=(0, 6))``.
 
-    A setting given as two numbers is drawn from that range, both included: whole numbers where both are. Any other
-    value is set for all.
+    A setting given as two numbers is drawn from that range, both included: whole numbers where the setting is one. Any
+    other value is set for all.
 
     Args:
         base: A scenario or its name; or a family or its name, whose settings are changed.

@@ -427,7 +427,7 @@ def _in_team(s: Scenario) -> _Conflicts:
         yield "breaks", f"at most num_trackers - 1 = {s.num_trackers - 1}"
     if s.break_choice == "given" and s.breaks > 1:
         yield "breaks", 'break_choice="given" names one tracker, break_number'
-    if s.break_choice == "given" and s.break_number >= s.num_trackers:
+    if s.breaks and s.break_choice == "given" and s.break_number >= s.num_trackers:
         yield "break_number", f"trackers are 0 to {s.num_trackers - 1}"
     offsets = s.slot_offsets
     apart = min((math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf)

@@ -138,6 +138,9 @@ def test_an_object_that_is_no_target_policy_is_refused() -> None:
         posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
+    for outside, words in (("tracker", "known: trackers, target"), (2, "not in the team"), (1.0, "whole number")):
+        with pytest.raises(posse.ScenarioError, match=words):
+            posse.PairedBatch(SHORT, 1, Crossing(), outside=outside)  # type: ignore[arg-type]
 
 
 def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:

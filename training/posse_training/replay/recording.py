@@ -15,6 +15,7 @@ from posse import REWARD_TERMS, Field, Scenario, get_scenario, scenario_names
 from posse_baselines import Policy, Target, Trajectory, batch_for, load, load_target, rollout
 from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
+from posse_training.evaluation.evaluation import played_errors
 from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
 from posse_training.replay.columns import columns_of, find_events
@@ -69,7 +70,8 @@ def record(
         label, policy = given if isinstance(given, tuple) else ("", given)
         loaded = load(policy) if isinstance(policy, str) else policy
         batch = batch_for(loaded, settings, 1, opponent, **place, autoreset="disabled")
-        played = rollout(batch, loaded, RECORD, steps=steps)
+        with played_errors():
+            played = rollout(batch, loaded, RECORD, steps=steps)
         one = replay_of(played, label or loaded.name, observations=observations, about=_about(loaded))
         player = replace(one.players[0], argument=policy if isinstance(policy, str) else "")
         replays.append(Replay(one.world | {"options": options}, (player,)))

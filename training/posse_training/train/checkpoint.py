@@ -64,7 +64,7 @@ def read_checkpoint(folder: Path) -> State:
     """
     path = folder / CHECKPOINT
     if not path.is_file():
-        raise RunFolderError(f"{folder} has no {CHECKPOINT}: start the training again")
+        raise RunFolderError(f"{folder} has no {CHECKPOINT}, which every run but one of cmaes keeps: name another")
     try:
         state: State = torch.load(path, weights_only=True)
     except Exception as error:  # whatever a damaged file makes torch raise
