@@ -56,7 +56,7 @@ def draw() -> None:
         axes.text(
             4.6,
             -3.1,
-            "converging, flocking, leader exchange → searching: no fix of the target for target_lost_after",
+            "converging, flocking, leader exchange → searching: no fix of the target for 10 s",
             ha="center",
             fontsize=9,
         )

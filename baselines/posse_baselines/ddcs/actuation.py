@@ -200,7 +200,7 @@ def execute_safely(team: Team, me: Record, discs: Records, action: FloatArray) -
     if evades or velocity != me.wish:
         speed, omega = regulate(me, velocity)
     # Made up for the lag, and remembered until it is executed.
-    more, delay = team.settings.foresight * (1.0 / team.world.followed - 1.0), int(team.world.delay)
+    more, delay = 1.0 / team.world.followed - 1.0, int(team.world.delay)
     speed += more * (speed - me.speed)
     omega += more * (omega - me.omega)
     if delay > 0:

@@ -37,7 +37,7 @@ from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, sur
 from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, place_mates, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
-from posse_baselines.ddcs.roles import choose_slot, settle_lead
+from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
@@ -156,7 +156,7 @@ def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
         settle_lead(team, me, mates)
     if me.known == 0:
         me.slot = -1
-    elif me.slot < 0 or is_due(team, me, team.settings.replan_time):
+    elif me.slot < 0 or is_due(team, me, REPLAN_TIME):
         choose_slot(team, me, mates, work)
     me.task = next_task(team, me, mates)
     move(team, me, mates)

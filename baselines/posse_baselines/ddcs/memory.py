@@ -69,8 +69,7 @@ def offsets_of(layout: ObservationLayout) -> Records:
 def constants_of(scenario: Scenario, settings: Settings) -> Records:
     """Return what is constant of robots and arena, as an array of one record; a metre is a unit of :func:`unit_of`."""
     unit, dt, lag = unit_of(scenario), _F(scenario.control_step), scenario.actuator_lag
-    foreseen = settings.foresight > 0.0 and scenario.command_delay <= _MOST_WAITING
-    delay = scenario.command_delay if foreseen else 0
+    delay = scenario.command_delay if scenario.command_delay <= _MOST_WAITING else 0
     half_width, half_height = (half / unit for half in scenario.half_sides)
     sight = min(scenario.sensing_range / unit, _MOST_SIGHT)
     unlisted = scenario.neighbours < scenario.num_trackers - 1
@@ -155,13 +154,11 @@ MIND: Final = record(
     **BODY,
     # the target, as it was at the newest fix
     fix_step=_I(-1),  # own step of that fix; -1: none yet
-    fix=_C(0),  # estimated position
-    raw=_C(0),  # position by the fix alone
+    fix=_C(0),  # position
     fix_theta=_F(0),
     fix_psi=_F(0),
     target_speed=_F(0),  # estimated speed, m/s
     target_turn=_F(0),  # estimated turn rate, rad/s
-    target_mean=_C(0),  # its mean velocity, m/s
     speed_known=_I(0),  # 1: the speed has been measured
     # the target, as it is taken to be now
     target=_C(0),  # position

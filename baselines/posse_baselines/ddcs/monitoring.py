@@ -25,8 +25,11 @@ _PART: Final = 0.45  # of a step; where poses drift, a number carries a measure 
 _FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
-_MEAN_MEMORY: Final = 6.0  # s; time constant of the target's mean velocity
 _LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
+_TARGET_LOST: Final = 10.0  # s; a fix older than this is no longer followed
+_SPEED_MEMORY: Final = 3.0  # s; time constant of the target's estimated speed
+_LOST_AFTER: Final = 1.5  # s; longest silence of a team-mate that is ignored
+_LEAST_PATIENCE: Final = 0.3  # s; so is a silence shorter than this plus twice the usual one
 _GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
 
 
@@ -157,7 +160,7 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     if me.fix_age <= _LATE:
         # The usual age of fixes, to detect unusual delays.
         me.usual_age += (dt / _GAP_MEMORY) * (me.fix_age - me.usual_age)
-    if me.fix_age <= settings.target_lost_after:
+    if me.fix_age <= _TARGET_LOST:
         me.known = 1
     me.target, theta = target_after(team, me, me.fix_age)
     me.target_theta, me.target_velocity = theta, vector(me.target_speed, theta)
@@ -174,42 +177,36 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
 
 @compiled
 def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
-    """Blend a newer fix into the estimate."""
+    """Take a newer fix into the estimate."""
     at, settings = team.at, team.settings
     position = me.position + scaled(pair(row, at.target_bearing) * me.heading, row[at.target_range])
     theta = angle_of(pair(row, at.target_heading) * me.heading)
     psi = angle_of(pair(row, at.target_frame) * me.heading)
     time = (fix_step - me.fix_step) * team.world.dt
-    if me.fix_step < 0 or time > settings.target_lost_after:
-        me.fix, me.target_turn = position, 0.0
-        if me.speed_known == 0:
-            me.target_speed = _UNKNOWN_SPEED * me.max_speed
-        me.target_mean = vector(me.target_speed, theta)
-    else:
+    me.target_turn = 0.0
+    if me.fix_step < 0:
+        me.target_speed = _UNKNOWN_SPEED * me.max_speed
+    elif time <= _TARGET_LOST:
         # Both headings have the same noise, and of the slot frame it is known how fast it turns.
         psi_guess = me.fix_psi + clip(wrap(theta - psi), -me.psi_limit * time, me.psi_limit * time)
         noise = (1.0 - settings.heading_trust) * wrap(psi - psi_guess)
         theta, psi = wrap(theta - noise), wrap(psi - noise)
-        guess, _ = target_after(team, me, time)
         turned = wrap(theta - me.fix_theta)
-        me.target_turn = 0.0
         if time <= settings.turn_memory:
             me.target_turn = turned / time
-            along = dot(position - me.raw, vector(1.0, me.fix_theta + 0.5 * turned)) / time
-            share = 1.0 - math.exp(-time / settings.speed_memory) if me.speed_known else 1.0
+            along = dot(position - me.fix, vector(1.0, me.fix_theta + 0.5 * turned)) / time
+            share = 1.0 - math.exp(-time / _SPEED_MEMORY) if me.speed_known else 1.0
             me.target_speed = clip(me.target_speed + share * (along - me.target_speed), 0.0, me.max_speed)
             me.speed_known = 1
-        me.fix = guess + scaled(position - guess, settings.fix_trust)
-        me.target_mean += scaled(vector(me.target_speed, theta) - me.target_mean, 1.0 - math.exp(-time / _MEAN_MEMORY))
-    me.raw, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
+    me.fix, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
 
 
 @compiled
 def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
     """Update the table of team-mates (N,) with an observation (F,)."""
-    at, settings, dt = team.at, team.settings, team.world.dt
+    at, dt = team.at, team.world.dt
     me.usual_gap -= me.usual_gap * min(1.0, dt / _GAP_MEMORY)
-    if not settings.radio:
+    if not team.settings.radio:
         return
     me.horizon = 0.0
     for p in range(at.neighbours):
@@ -218,7 +215,7 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         if number < 0:
             continue
         # Nearest first: others are farther away than the last of the list, or not heard.
-        if age < settings.lost_after:
+        if age < _LOST_AFTER:
             me.horizon = away
         mate = mates[number]
         sent = me.step - round(age / dt)
@@ -226,7 +223,7 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
             continue
         if mate.step >= 0:
             gap = float((sent - mate.step) * dt + age)
-            if gap < settings.lost_after:
+            if gap < _LOST_AFTER:
                 me.usual_gap = max(me.usual_gap, gap)
         mate.step, mate.heard = sent, me.step
         mate.position = me.position + scaled(pair(row, at.neighbour_bearing + k) * me.heading, away)
@@ -247,8 +244,8 @@ def place_mates(team: Team, me: Record, mates: Records) -> None:
 
     One that has been silent for over twice the usual time counts as stopped. Of oneself nothing is heard.
     """
-    settings, me.others = team.settings, 0
-    me.patience = min(settings.lost_after, settings.least_patience + 2.0 * me.usual_gap)
+    me.others = 0
+    me.patience = min(_LOST_AFTER, _LEAST_PATIENCE + 2.0 * me.usual_gap)
     for j in range(len(mates)):
         mate = mates[j]
         silence = since(team, me, mate.step)

@@ -26,7 +26,6 @@ from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled,
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
-_SOON: Final = 0.1  # s; a slot met sooner counts as met then
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 _LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, below which it is l-φ on the nearer robot
 
@@ -108,16 +107,9 @@ def move(team: Team, me: Record, mates: Records) -> None:
 
 @compiled
 def hunt(team: Team, me: Record) -> None:
-    """Set the motion to see a lost target again.
-
-    The team spreads on a ring around its predicted position, slot by slot on either side of its
-    heading; the ring grows with the time that it was not seen.
-    """
-    settings = team.settings
-    side = 1.0 if me.slot % 2 else -1.0
-    angle = me.target_theta + side * ((me.slot + 1) // 2) * 2.0 * math.pi / len(team.slots)
-    way = me.target + vector(settings.hunt_growth * me.fix_age, angle) - me.position
-    want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))))
+    """Set the motion to see a lost target again: to its predicted position."""
+    way = me.target - me.position
+    want(me, scaled(unit(way), min(me.max_speed, team.settings.gain * length(way))))
 
 
 @compiled
@@ -132,11 +124,7 @@ def hold_slot(team: Team, me: Record) -> None:
     if me.task == CONVERGING:
         gain, clearance = _FULL_SPEED, settings.clearance
     way = steering.way_round(start, arm, clearance) - start
-    # A far slot moves at the target's mean velocity: a target that weaves has turned back by then.
-    time = max(_SOON, steering.intercept_time(way, me.target_velocity, me.max_speed))
-    share = (1.0 - math.exp(-time / settings.weave_time)) * settings.weave_time / time
-    slot = scaled(steering.slot_velocity(me.target_velocity, me.psi_rate, arm), share)
-    slot += scaled(me.target_mean, 1.0 - share)
+    slot = steering.slot_velocity(me.target_velocity, me.psi_rate, arm)
     want(me, steering.approach_velocity(way, slot, gain, me.max_speed, me.acceleration))
 
 

@@ -13,7 +13,7 @@ group. The leader counts its steps in its message, and the others relay the high
 away know that the leader is alive.
 
 **Slots.** Each tracker assigns all known trackers and takes its own slot. Trackers with equal knowledge get equal
-results. Otherwise, for example after lost messages, slots claimed in messages are respected (``loyalty``).
+results. Otherwise, for example after lost messages, slots claimed in messages are respected.
 """
 
 from __future__ import annotations
@@ -30,7 +30,12 @@ from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
 from posse_baselines.laws.steering import Work, assign, intercept_time
 
+REPLAN_TIME: Final = 0.5
+"""s. Time between two assignments."""
 _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
+_IN_SIGHT: Final = 0.95  # share of the range of sight within which a slot counts as seeing the target
+_SIGHT_WORTH: Final = 10.0  # s; bonus of such a slot, as arrival time
+_LOYALTY: Final = 0.6  # s; least gain in total arrival time for a change of slots
 _TAKEN_COST: Final = 8.0  # s; cost of a slot in which the sonar detects a robot that is not heard
 _RESERVED: Final = 1e4  # s; cost of a slot claimed by another
 _HALF_TURN: Final = 0.25 * math.pi  # of the turning time, per 1 - cos
@@ -118,8 +123,8 @@ def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: in
     facing = dot(unit(way), heading)
     time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)
     # With more slots than trackers, those that see the target are filled first.
-    if dot(slot, slot) < (settings.in_sight * team.world.sight) ** 2:
-        time -= settings.sight_worth
+    if dot(slot, slot) < (_IN_SIGHT * team.world.sight) ** 2:
+        time -= _SIGHT_WORTH
     return float(time)
 
 
@@ -150,7 +155,7 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
                 continue
             time = slot_cost(team, me, mate.place, heading, k)
             if held == k:
-                time -= settings.loyalty
+                time -= _LOYALTY
             if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
                 time += _TAKEN_COST
             # The leader of the centralized model takes the first slot.

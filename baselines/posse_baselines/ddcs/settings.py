@@ -51,24 +51,12 @@ class Settings:
     """Forbidden transitions of the task (``TRANSITIONS``), for ablations."""
 
     # monitoring
-    speed_memory: float = tuned(3.0, "s", 0.1, 10.0)
-    """Time constant of the target's estimated speed."""
-    weave_time: float = tuned(1.5, "s", 0.2, 10.0)
-    """Time constant with which the target's velocity becomes its mean one, on the way to a far slot."""
     turn_memory: float = tuned(1.0, "s", 0.1, 5.0)
     """Decay time constant of a measured turn rate of the target."""
-    fix_trust: float = tuned(0.6, "", 0.05, 1.0)
-    """Share of a new fix in the estimate of the position."""
     heading_trust: float = tuned(1.0, "", 0.02, 1.0)
     """Share of a new measurement in the slot frame's estimated heading. The target's has the same noise."""
     frame_trust: float = tuned(0.5, "", 0.02, 1.0)
     """Where poses drift: share of a new measurement in the offset between a team-mate's frame and the own one."""
-    least_patience: float = tuned(0.3, "s", 0.1, 3.0)
-    """A silence shorter than this plus twice the usual one is ignored."""
-    lost_after: float = tuned(1.5, "s", 0.3, 5.0)
-    """Timeout of a team-mate, and of the leader's pulse."""
-    target_lost_after: float = tuned(10.0, "s", 1.0, 30.0)
-    """A fix older than this is no longer followed: the target is lost."""
 
     # the tasks
     time_lag: float = tuned(1.0, "s", 0.1, 10.0)
@@ -91,19 +79,9 @@ class Settings:
     """Push from a team-mate at a distance of 1 m, where the own heading pulls by 1; it falls as 1 / d²."""
 
     # slots
-    replan_time: float = tuned(0.5, "s", 0.1, 3.0)
-    """Time between two assignments."""
-    loyalty: float = tuned(0.6, "s", 0.0, 5.0)
-    """Least gain in total arrival time for a change of slots."""
-    sight_worth: float = tuned(10.0, "s", 0.0, 30.0)
-    """Bonus of a slot from which the target is in sight, as arrival time."""
-    in_sight: float = tuned(0.95, "", 0.1, 1.0)
-    """Share of the sensing range within which a slot counts as seeing the target."""
     close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
-    """With a fix older than this, beyond the usual age, the team moves to a ring around the
-    predicted position of the target, to see it again."""
-    hunt_growth: float = tuned(0.3, "m/s", 0.0, 1.0)
-    """Growth rate of that ring."""
+    """With a fix older than this, beyond the usual age, the team moves to the predicted position of the target, to see
+    it again."""
 
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)
@@ -126,9 +104,6 @@ class Settings:
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
     """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
 
-    foresight: float = tuned(1.0, "", 0.0, 1.0)
-    """Where robots obey late: share of ``actuator_lag`` that commands make up for, up to the limits. With more than 0,
-    the team also decides for the pose at which its command is executed, up to 10 steps of ``command_delay`` ahead."""
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)

@@ -322,7 +322,7 @@ class BeliefPlanner(DDCS):
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
         proposals, memory = super().propose(observations, memory)
-        me, mates, team, beliefs = memory.me, memory.mates, memory.team, memory.beliefs
+        me, mates, beliefs = memory.me, memory.mates, memory.beliefs
         shape = me.shape
         plans = beliefs.search.teams.plans.reshape(mates.shape)
         if beliefs.late:  # where trackers know different things, they keep to what they tell each other
@@ -333,8 +333,8 @@ class BeliefPlanner(DDCS):
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.
-        made_up = 1.0 + team.settings["foresight"][0] * (1.0 / team.world["followed"][0] - 1.0)
-        speed, omega = (old + (new - old) / made_up for old, new in ((me["speed"], speed), (me["omega"], omega)))
+        followed = memory.team.world["followed"][0]
+        speed, omega = (old + followed * (new - old) for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
         wish = mine["wish"] / unit_of(memory.layout.scenario)
         wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}

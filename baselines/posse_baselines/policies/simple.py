@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import ONE, FloatArray, kernel
-from posse.rules import mix
+from posse.numeric import FloatArray
 from posse_baselines.policy import BasePolicy, Memory, check_observations
 
 _SHIFT: Final = np.uint64(40)
@@ -47,25 +45,17 @@ class Random(BasePolicy):
             raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
         self.seed = seed
 
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the factors (N, 2 + m, F) that make draws of observations."""
+        s = super().begin(layout, num_worlds).scenario
+        shape = s.num_trackers, 2 + s.message_size, layout.size
+        return np.random.default_rng(self.seed).integers(2**64, size=shape, dtype=np.uint64)
+
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return random speeds, turn rates and messages."""
-        words = np.ascontiguousarray(observations, np.float32).view(np.uint32)
-        actions = np.empty((*words.shape[:2], 2 + memory.scenario.message_size), np.float32)
-        draw_from_observations(words, np.uint64(self.seed), actions)
-        return actions, memory
-
-
-@kernel
-def draw_from_observations(words: npt.NDArray[np.uint32], seed: np.uint64, actions: FloatArray) -> None:
-    """Fill actions (E, N, A) with draws keyed by the seed and observations (E, N, F) as words."""
-    for e in range(words.shape[0]):
-        for i in range(words.shape[1]):
-            key = mix(seed, np.uint64(i))
-            for k in range(words.shape[2]):
-                key = mix(key, np.uint64(words[e, i, k]))
-            for k in range(actions.shape[2]):
-                draw = mix(key, np.uint64(k)) >> _SHIFT
-                actions[e, i, k] = np.float32(draw) * _TO_BOTH_SIDES - ONE
+        words = np.ascontiguousarray(observations, np.float32).view(np.uint32).astype(np.uint64)
+        draws = np.einsum("eif,iaf->eia", words, memory) >> _SHIFT  # the highest bits of products depend on all others
+        return draws.astype(np.float32) * _TO_BOTH_SIDES - np.float32(1.0), memory
 
 
 class Pursuit(BasePolicy):
