@@ -116,7 +116,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
 @compiled
 def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: int) -> float:
     """Return the time (s) that a tracker takes to slot k, less what the slot is worth."""
-    settings, slot = team.settings, team.slots[k]
+    slot = team.slots[k]
     way = me.target + slot * me.frame - position
     time = intercept_time(way, me.target_velocity, me.max_speed)
     # Time for turning towards it, up to half a turn.

@@ -104,7 +104,6 @@ class Settings:
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
     """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
 
-
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
     """Clearance to robots and walls."""
