@@ -66,7 +66,7 @@ def offsets_of(layout: ObservationLayout) -> Records:
     return record(**{name: _I(value) for name, value in at.items()})
 
 
-def constants_of(scenario: Scenario, settings: Settings) -> Records:
+def constants_of(scenario: Scenario) -> Records:
     """Return what is constant of robots and arena, as an array of one record; a metre is a unit of :func:`unit_of`."""
     unit, dt, lag = unit_of(scenario), _F(scenario.control_step), scenario.actuator_lag
     delay = scenario.command_delay if scenario.command_delay <= _MOST_WAITING else 0
@@ -243,7 +243,7 @@ class Minds(OwnArrays):
         cosines, sines = beam_directions(layout.scenario)
         self.team = Team(
             offsets_of(layout),
-            constants_of(layout.scenario, settings),
+            constants_of(layout.scenario),
             settings_of(settings),
             np.array([complex(*slot) / unit for slot in layout.scenario.slot_offsets], np.complex64),
             (cosines + 1j * sines).astype(np.complex64),

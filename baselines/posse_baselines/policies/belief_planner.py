@@ -25,13 +25,11 @@ from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
-_FIX_TRUST: Final = 0.3  # share of the difference between a noisy fix and the believed position that is corrected
-_HEADING_TRUST: Final = 0.1  # the same of noisy headings: the slot frame's, and with it the target's
+_HEADING_TRUST: Final = 0.1  # share of the difference from the believed heading of the slot frame that is corrected
 _LOST_AFTER: Final = 2.0  # s; age of a fix up to which the planned motion is played, then the script's
 _UNSEEN_DELAY: Final = 30.0  # s; by how much later slots are filled from which the target cannot be seen
 _AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that the target was believed to have
 _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
-_JUMP: Final = 1.0  # m; a fix farther than this from what was believed replaces it
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
 _APART: Final = 10  # control steps between two turn rates from which a weave is told
@@ -93,7 +91,6 @@ class Beliefs(OwnArrays):
         scenario = layout.scenario
         self.layout, self.dt = layout, scenario.control_step
         self.rows = num_worlds * scenario.num_trackers
-        self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
         window = 2 * scenario.radio_delay + 2 if self.late else 0
         assumed = believed(scenario)
@@ -217,10 +214,6 @@ class Beliefs(OwnArrays):
         turn = np.where(gap <= _GAP, _wrap(angle - seen["theta"]) / np.maximum(gap, self.dt), 0.0)
         turn = np.clip(turn, -s.target_turn_rate, s.target_turn_rate)
         surprise = _wrap(angle - np.arctan2(w["heading_sin"], w["heading_cos"]))
-        if self.noisy:
-            guess = w["x"] + 1j * w["y"]
-            trust = np.where(first | (np.abs(place - guess) > _JUMP), 1.0, _FIX_TRUST)
-            place = guess + trust * (place - guess)
         speed = np.full(self.rows, s.target_speed)
         if s.target_is_agent:
             speed = np.clip(np.abs(velocity), s.target_least_speed, s.target_speed)
