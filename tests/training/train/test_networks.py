@@ -16,7 +16,7 @@ from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.checkpoint import read_checkpoint, restore_model
 from posse_training.train.export import export
 from posse_training.train.imitation import imitate
-from posse_training.train.networks import Normaliser, QuickTanh, RunningStatistics
+from posse_training.train.networks import Normaliser, RunningStatistics
 from posse_training.train.train import train
 from posse_training.train.worlds import make_env
 
@@ -70,14 +70,6 @@ def test_the_state_changes_values_but_no_actions(tmp_path: Path) -> None:
     other[:, env.encoding.size :] += 5.0
     with torch.no_grad():
         assert (policy.predict_values(rows) - policy.predict_values(other)).abs().max() > 1e-4
-
-
-def test_the_fast_tanh_is_the_hyperbolic_tangent() -> None:
-    x = torch.cat([torch.linspace(-12, 12, 10_001), torch.tensor([90.0, -90.0, 1e-6, np.inf, -np.inf, np.nan])])
-    y = QuickTanh()(x)
-    np.testing.assert_allclose(y.numpy(), np.tanh(x.double().numpy()), rtol=0, atol=3e-7)
-    assert y.abs().nan_to_num().max() == 1.0
-    assert torch.autograd.gradcheck(QuickTanh(), torch.randn(500, dtype=torch.float64, requires_grad=True))
 
 
 class _Circle(BasePolicy):

@@ -11,16 +11,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from posse import get_scenario, scenario_names
+from posse import Family, Scenario, family, family_names, get_scenario, scenario_names
+from posse.scenarios.family import scenario_or_family
 from posse_training.options import words_of
 
 
 @dataclass(frozen=True)
 class _Scenarios:
-    """List the scenarios, or all settings of one."""
+    """List the scenarios and families, or all settings of one."""
 
     name: Annotated[str | None, tyro.conf.Positional] = None
-    """Scenario whose settings to list."""
+    """Scenario or family whose settings to list."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,13 @@ class _Policies:
 
 
 def scenarios(arguments: Sequence[str]) -> None:
-    """List the scenarios with their differences from ``constant``, or all settings of one."""
+    """List the scenarios with their differences from ``constant``, and families, or all settings of one."""
     which = tyro.cli(_Scenarios, prog="posse scenarios", args=arguments)
     if which.name is not None:
-        scenario, rows = get_scenario(which.name), []
-        for name, declared in scenario.settings().items():
-            value = " ".join((str(getattr(scenario, name)), declared.unit.replace("1", "")))
+        found, rows = scenario_or_family(which.name), []
+        values = vars(found.base) | dict(found.ranges) if isinstance(found, Family) else vars(found)
+        for name, declared in Scenario.settings().items():
+            value = " ".join((str(values[name]), declared.unit.replace("1", "")))
             rows.append((name, value.strip(), "; ".join(filter(None, (declared.meaning, declared.range)))))
         _show(("setting", "value", "meaning; range"), rows)
         return
@@ -46,6 +48,9 @@ def scenarios(arguments: Sequence[str]) -> None:
         scenario = get_scenario(name)
         own = {k: v for k, v in scenario.to_dict().items() if v != plain[k] and k not in ("name", "meaning")}
         rows.append((name, scenario.meaning, " ".join(words_of(own)) or "-"))
+    for name in family_names():
+        drawn = family(name)
+        rows.append((name, drawn.meaning, " ".join(f"{k}={low:g}..{high:g}" for k, (low, high) in drawn.ranges)))
     _show(("scenario", "meaning", "what is set otherwise than in constant"), rows)
 
 
