@@ -7,19 +7,11 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import Policy, PolicyError, batch_for, load, load_target, play, policy_names, target_names
+from posse_baselines import PolicyError, batch_for, load, load_target, play, policy_names, target_names
 from posse_baselines.playing import rollout
 from posse_baselines.policies.open_loop import OPEN_LOOP
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
-
-
-@pytest.mark.parametrize("name", policy_names())
-def test_a_name_loads_the_policy_that_bears_it(name: str) -> None:
-    policy = load(name)
-    assert isinstance(policy, Policy)
-    assert policy.name == name
-    assert policy.reads_state == (name == "planner")
 
 
 @pytest.mark.parametrize(
