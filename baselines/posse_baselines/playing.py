@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 import posse
 from posse import Batch, ObservationLayout, PairedBatch, Scenario
-from posse.engine.arguments import check_count
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
 from posse_baselines.registry import Target
@@ -255,8 +254,8 @@ def rollout(
             different steps with autoreset disabled.
         ValueError: An unknown name to record, or ``steps`` below 1.
     """
-    if steps is not None:
-        steps = check_count("steps", steps, 1)
+    if steps is not None and (not isinstance(steps, (int, np.integer)) or steps < 1):
+        raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
     _check_target_moves(policy, batch)
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)

@@ -12,7 +12,7 @@ evades.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import gymnasium
 import numpy as np
@@ -22,12 +22,13 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
-from posse.engine.arguments import as_float32, in_box
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import PolicyError, check_observations, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
+
+_MOST: Final = 1 + 1e-6  # numbers up to this are clipped, since rounding may exceed 1
 
 
 class Guard(Minds):
@@ -49,11 +50,13 @@ class Guard(Minds):
         Call it once a control step, with its observations (E, R, F). ValueError if the shape is another, or a number
         is not in [-1, 1]; with ``clip``, it has to be finite.
         """
-        name = "the array of wanted velocities"
-        actions = as_float32(name, wanted).copy()
-        if actions.ndim != 3 or actions.shape[:2] != self.me.shape or actions.shape[2] < 2:
-            raise ValueError(f"{name} has shape {actions.shape}, wanted {(*self.me.shape, 2)} or with the message")
-        actions = in_box(actions, clip, f"{name}[{{}}, {{}}, {{}}]".format)
+        given = np.array(wanted, np.float32)
+        if given.ndim != 3 or given.shape[:2] != self.me.shape or given.shape[2] < 2:
+            raise ValueError(f"wanted velocities have shape {given.shape}, not {(*self.me.shape, 2)} or more")
+        allowed = np.isfinite(given) if clip else np.abs(given) <= _MOST
+        if not allowed.all():
+            raise ValueError(f"a wanted velocity of {given[~allowed][0]} is not a number in [-1, 1]: scale it")
+        actions = np.ascontiguousarray(given.clip(-1, 1))
         self.run(guard_all, check_observations("safeguard", observations, self.me.shape, self.layout), actions)
         return actions
 

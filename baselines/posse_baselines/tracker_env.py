@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 from posse import Batch, PairedBatch, Scenario, ScenarioError
 from posse.adapters.gymnasium_env import TeamEnv, team_scenario
 from posse.adapters.vector_env import TeamVectorEnv
-from posse.engine.arguments import check_count
 from posse_baselines.policy import Policy
 from posse_baselines.registry import load
 
@@ -28,7 +28,7 @@ class _WithTeammates:
         **settings: Any,
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
-        self.number, self._silent = check_count("number", number, 0), silent
+        self.number, self._silent = number, silent
         super().__init__(*arguments, **settings)
 
     def _fit(self, scenario: str | Scenario, **overrides: Any) -> Scenario:
@@ -36,8 +36,9 @@ class _WithTeammates:
         found = team_scenario(scenario, **overrides)
         if found.num_trackers < 2:
             raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")
-        if self.number >= found.num_trackers:
-            raise ScenarioError(f"number={self.number} is not in the team: trackers are 0 to {found.num_trackers - 1}")
+        number, last = self.number, found.num_trackers - 1
+        if not isinstance(number, (int, np.integer)) or not 0 <= number <= last:
+            raise ScenarioError(f"number={number!r} is not in the team: trackers are 0 to {last}")
         return found.replace(message_size=max(found.message_size, self.teammates.message_size))
 
     def _make(self, scenario: Scenario, num_worlds: int, target_policy: Any, **settings: Any) -> Batch:

@@ -55,8 +55,8 @@ def test_a_refused_reset_leaves_what_the_team_mates_remember() -> None:
 
 @pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])
 def test_what_cannot_be_played_is_refused(make: Any) -> None:
-    for number, words in ((5, "number=5 is not in the team"), (1.0, "number=1.0 must be a whole number")):
-        with pytest.raises(ValueError, match=words):
+    for number in (5, 1.0):
+        with pytest.raises(posse.ScenarioError, match=f"number={number} is not in the team"):
             make(scenario="constant", number=number)
     with pytest.raises(posse.ScenarioError, match="no team-mates"):
         make(scenario="constant", num_trackers=1)

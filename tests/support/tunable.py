@@ -45,7 +45,7 @@ class Biased(DDCS):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         actions, memory = super().act(observations, memory)
-        actions[..., 1] = np.clip(actions[..., 1] + self.bias.bias - BEST, -1.0, 1.0)
+        actions[..., 1] = np.clip(actions[..., 1] + 2.0 * (self.bias.bias - BEST), -1.0, 1.0)
         return actions, memory
 
 

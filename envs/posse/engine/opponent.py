@@ -57,7 +57,6 @@ class PairedBatch(Batch):
         settings: Further arguments of :class:`Batch`.
 
     Attributes:
-        memory: Memory of the policy inside.
         everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), the target's row
             last.
         observation_shape: (E, rows, F).
@@ -94,8 +93,20 @@ class PairedBatch(Batch):
         self.observation_shape = (*self.action_shape[:2], self.layout.size)
         if hasattr(inside, "watch"):
             inside.watch(self)
+        self._begun = np.zeros(worlds, np.bool_)  # episodes for which the memory is still to be restarted
         self.memory = inside.begin(self.layout, worlds)
-        self._begun = np.zeros(worlds, np.bool_)  # episodes that began since the policy inside acted
+
+    @property
+    def memory(self) -> Any:
+        """Memory of the policy inside, restarted where an episode began since it acted."""
+        if self._begun.any():  # not earlier: the reset that began them could still have been refused
+            self._memory = self.inside.restart(self._memory, self._begun)
+            self._begun = np.zeros_like(self._begun)
+        return self._memory
+
+    @memory.setter
+    def memory(self, memory: Any) -> None:
+        self._memory = memory
 
     @property
     def working(self) -> BoolArray:
@@ -134,8 +145,7 @@ class PairedBatch(Batch):
         """Return the actions of all robots, and the memory of the policy inside."""
         who = "target's" if self.outside == "trackers" else "team's"
         seen = self.everyone[1].observations[:, self._theirs].copy()
-        memory = self.inside.restart(self.memory, self._begun) if self._begun.any() else self.memory
-        chosen, memory = self.inside.act(seen, memory)
+        chosen, memory = self.inside.act(seen, self.memory)
         array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
