@@ -254,7 +254,7 @@ def rollout(
             different steps with autoreset disabled.
         ValueError: An unknown name to record, or ``steps`` below 1.
     """
-    if steps is not None and (not isinstance(steps, (int, np.integer)) or steps < 1):
+    if steps is not None and (steps < 1 or steps != int(steps)):
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
     _check_target_moves(policy, batch)
     recorder = Recorder(batch, record)

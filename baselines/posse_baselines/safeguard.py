@@ -128,9 +128,9 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        if self._guard is None or not self.env.agents:
-            return self.env.step(actions)  # which refuses them
-        motions = self._guard.actions(self._seen, stack_agents(actions), self.env.unwrapped.batch.clip_actions)
-        result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **split_agents(motions, actions)})
+        if self._guard is not None and self.env.agents:  # else the environment refuses the step
+            motions = self._guard.actions(self._seen, stack_agents(actions), self.env.unwrapped.batch.clip_actions)
+            actions = {**actions, **split_agents(motions, actions)}
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step(actions)
         self._seen = stack_agents(result[0])
         return result

@@ -30,7 +30,7 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
 
 
 def test_a_planner_plays_the_team_mates_and_a_number_of_numpy_is_a_tracker() -> None:
-    env = gymnasium.make_vec("posse/Tracker-v0", 2, scenario="smart", teammates="planner", number=np.int64(1), seed=3)
+    env: Any = gymnasium.make_vec("posse/Tracker-v0", 2, scenario="smart", teammates="planner", number=np.int64(1))
     env.reset()
     for _ in range(3):
         env.step(np.ones((2, 2), np.float32))
@@ -50,7 +50,7 @@ def test_a_refused_reset_leaves_what_the_team_mates_remember() -> None:
             with pytest.raises(ValueError, match="would start in"):
                 env.reset(options={"tracker_pose": np.zeros((5, 3))})
         observations.append([env.step(np.zeros(2, np.float32))[0] for _ in range(3)])
-    np.testing.assert_array_equal(*observations)
+    np.testing.assert_array_equal(observations[0], observations[1])
 
 
 @pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])

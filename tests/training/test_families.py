@@ -136,7 +136,8 @@ def test_other_ranges_are_drawn_from_for_a_test() -> None:
 
 
 def test_worlds_side_by_side_start_from_poses_of_their_own_or_not_at_all() -> None:
-    env = gym.make_vec("posse/Team-v0", 4, scenario=posse.family("obstacles", arena=(18.0, 28.0), num_obstacles=(0, 0)))
+    family = posse.family("obstacles", arena=(18.0, 28.0), num_obstacles=(0, 0))
+    env: Any = gym.make_vec("posse/Team-v0", 4, scenario=family)
     with pytest.raises(gym.error.ResetNeeded):
         env.reset(options={"reset_mask": np.array([True, False, False, False])})
     env.reset(seed=3)

@@ -114,7 +114,7 @@ class BatchEnv:
         masks = self._split(mask_of(given, sum(batch.num_worlds for batch in self.batches)))
         parts = [{**given, "reset_mask": mask} for mask in masks]
         for name, axes in _POSES.items() if len(parts) > 1 else ():
-            if np.ndim(given.get(name)) == axes:  # of every world
+            if np.ndim(given.get(name, 0)) == axes:  # of every world
                 for part, poses in zip(parts, self._split(np.asarray(given[name])), strict=True):
                     part[name] = poses
         # Of several batches, which are restored if one refuses; a single one restores itself.

@@ -94,7 +94,7 @@ class PairedBatch(Batch):
         if hasattr(inside, "watch"):
             inside.watch(self)
         self._begun = np.zeros(worlds, np.bool_)  # episodes for which the memory is still to be restarted
-        self.memory = inside.begin(self.layout, worlds)
+        self._memory: Any = inside.begin(self.layout, worlds)
 
     @property
     def memory(self) -> Any:
@@ -103,10 +103,6 @@ class PairedBatch(Batch):
             self._memory = self.inside.restart(self._memory, self._begun)
             self._begun = np.zeros_like(self._begun)
         return self._memory
-
-    @memory.setter
-    def memory(self, memory: Any) -> None:
-        self._memory = memory
 
     @property
     def working(self) -> BoolArray:
@@ -129,7 +125,7 @@ class PairedBatch(Batch):
         If the policy's actions are invalid, neither the worlds nor its memory change.
         """
         if orders is None:
-            whole, self.memory = self._with_theirs(actions)
+            whole, self._memory = self._with_theirs(actions)
             self._begun = self.worlds["over"] != 0
         else:
             whole, self._begun = np.zeros_like(self.everyone[0]), self._begun | (orders != LOOK)
