@@ -146,8 +146,8 @@ def test_worlds_side_by_side_start_from_poses_of_their_own_or_not_at_all() -> No
     env.reset(options={"tracker_pose": poses, "target_pose": [-3.0, 0.0, 0.0]})
     batches = env.unwrapped.batches
     np.testing.assert_array_equal([batch.arrays.tracker["y"][0, 0] for batch in batches], np.arange(4))
-    poses[..., 0] += 0.5 * min(batch.scenario.arena for batch in batches) - 2.0  # outside the smallest
-    with pytest.raises(ValueError, match="tracker_pose"):
+    poses[..., 0] += 0.5 * min(batch.scenario.arena for batch in batches) - 4.0  # in a wall of the smallest alone
+    with pytest.raises(ValueError, match="tracker_4 of world 0 would start in a wall"):
         env.reset(seed=4, options={"tracker_pose": poses[0]})
     assert [int(batch.worlds["episode"][0]) for batch in batches] == [1] * 4
     assert {batch.seed for batch in batches} == {3}
