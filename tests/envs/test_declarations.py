@@ -214,7 +214,7 @@ import numpy as np
 import posse
 import bearing
 import distance
-import spiral
+import unwind
 from posse.signals.layout import StateLayout
 from tests.support.reference.state import directions, points
 
@@ -224,7 +224,7 @@ def last_heading(s, w):
     return w["heading_cos"]
 
 batch = posse.batch(
-    "constant", 40, target_motion="spiral", sensor="bearing-only", sensing_range=6.0,
+    "constant", 40, target_motion="unwind", sensor="bearing-only", sensing_range=6.0,
     num_trackers=3, radio_loss=0.1, metrics=["target_distance", "last_heading"], horizon=101,
 )
 s, layout = batch.scenario, StateLayout(batch.scenario)
@@ -256,13 +256,13 @@ for step in range(100):
 assert losses > 0
 turned = np.unwrap(heading, axis=0)
 turned -= turned[0]
-side = batch.state["world_spiral_side"]
+side = batch.state["world_unwind_side"]
 assert set(side) == {-1.0, 1.0}
 rates = s.target_turn_rate / (1 + 0.1 * s.control_step * np.arange(100))
 expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
 np.testing.assert_allclose(turned, side * expected[:, None], rtol=1e-4, atol=1e-3)
-np.testing.assert_array_equal(layout.views(layout.vector(batch.arrays))["spiral_side"], side)
-assert "spiral_side" not in StateLayout(posse.get_scenario("smart")).offsets
+np.testing.assert_array_equal(layout.views(layout.vector(batch.arrays))["unwind_side"], side)
+assert "unwind_side" not in StateLayout(posse.get_scenario("smart")).offsets
 
 # The metric, at any time and at the end of the episode; beside the built-in ones, which it leaves.
 metrics = batch.metrics()
