@@ -26,10 +26,11 @@ def repeat_all(folder: Path, console: Console) -> Iterator[Path]:
     """Repeat the runs of all shipped files in run folders below one, and write these again; yield the results."""
     for name in TUNED:
         for path in tuned_files(name).values():
-            words = shlex.split(json.loads(path.read_text(encoding="utf-8"))["command"])
-            settings = tyro.cli(TuneSettings, args=words[2:])
+            card = json.loads(path.read_text(encoding="utf-8"))
+            settings = tyro.cli(TuneSettings, args=shlex.split(card["command"])[2:])
+            only = tuple(each for each in settings.only if each not in card.get("dropped", ()))  # settings since gone
             out = folder / f"{settings.policy}-{settings.scenario}-{settings.seed}"
-            found = tune(replace(settings, out=out), console=console)
+            found = tune(replace(settings, only=only, out=out), console=console)
             write_atomically(path, found.read_bytes())
             yield found
 
