@@ -122,7 +122,7 @@ def begin(policy: Policy, batch: Batch) -> Memory:
     A TypeError says that something is no policy, such as a name.
     """
     if not isinstance(policy, Policy):
-        raise TypeError(f"{policy!r:.100} is not a policy: load() returns that of a name or a file")
+        raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; load() takes names")
     if policy.reads_state and hasattr(policy, "watch"):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
