@@ -100,6 +100,8 @@ class Batch(OwnArrays):
         self.split = check_choice("split", split, SPLITS)
         self.autoreset = check_choice("autoreset mode", autoreset, ("next_step", "same_step", "disabled"))
         self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
+        if not isinstance(clip_actions, bool):
+            raise ScenarioError(f"clip_actions={reprlib.repr(clip_actions)} must be True or False")
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
         self.term_names = tuple(term.name for term in Declarations.of(scenario).reward_terms)

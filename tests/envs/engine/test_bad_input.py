@@ -35,6 +35,7 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("batch", {"num_worlds": 0}, rf"num_worlds=0 {WHOLE} \[1, "),
         ("batch", {"num_worlds": 2**50}, r"num_worlds=1125899906842624 of \d+ bytes each .*: lower it"),
         ("batch", {"first_world": 2**63 - 1, "num_worlds": 2}, rf"first_world \+ num_worlds - 1=.* {WHOLE}"),
+        ("batch", {"clip_actions": "False"}, "clip_actions='False' must be True or False"),
         ("batch", {"num_threads": 0}, rf"num_threads=0 {WHOLE} \[1, "),
         ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
