@@ -252,7 +252,7 @@ def rollout(
     Raises:
         PolicyError: The policy does not fit the batch, the target is an agent that nothing moves, or episodes end at
             different steps with autoreset disabled.
-        ValueError: An unknown name to record, or ``steps`` below 1.
+        ValueError: An unknown name to record, or ``steps`` that are no whole number of at least 1.
     """
     if steps is not None and (steps < 1 or steps != int(steps)):
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")

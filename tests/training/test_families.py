@@ -132,7 +132,7 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
 def test_other_ranges_are_drawn_from_for_a_test() -> None:
     outside, fixed = OPEN.replace(target_speed=(0.75, 0.9)), OPEN.replace(target_speed=0.5)
     assert all(0.75 <= outside.draw(k).target_speed <= 0.9 for k in range(20))
-    assert fixed.draw(3).target_speed == 0.5
+    assert (fixed.draw(3).target_speed, [name for name, _ in fixed.ranges]) == (0.5, ["tracker_turn_rate"])
 
 
 def test_worlds_side_by_side_start_from_poses_of_their_own_or_not_at_all() -> None:

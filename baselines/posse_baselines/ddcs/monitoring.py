@@ -28,8 +28,8 @@ _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a sh
 _LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
 _TARGET_LOST: Final = 10.0  # s; a fix older than this is no longer followed
 _SPEED_MEMORY: Final = 3.0  # s; time constant of the target's estimated speed
-_LOST_AFTER: Final = 1.5  # s; longest silence of a team-mate that is ignored
-_LEAST_PATIENCE: Final = 0.3  # s; so is a silence shorter than this plus twice the usual one
+_LOST_AFTER: Final = 1.5  # s; a team-mate that has been silent for longer counts as lost
+_LEAST_PATIENCE: Final = 0.3  # s; a silence shorter than this plus twice the usual one is ignored
 _GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
 
 

@@ -209,11 +209,9 @@ class Robot:
     def _checked(self, message: Heard) -> Heard:
         _finite("a message heard", (*message[1:6], *message.message), (5 + len(message.message),))
         _check_age(message.age)
-        if (
-            check_count("heard number", message.number, 0) >= self.scenario.num_trackers
-            or message.number == self.number
-        ):
-            raise ValueError(f"heard number={message.number!r}, which is no team-mate of {self.number}")
+        number = check_count("heard number", message.number, 0)
+        if number >= self.scenario.num_trackers or number == self.number:
+            raise ValueError(f"heard number={number}, which is no team-mate of {self.number}")
         if len(message.message) not in (0, self.scenario.message_size):
             raise ValueError(f"heard a message of {len(message.message)}, wanted {self.scenario.message_size} numbers")
         return message._replace(fix=message.fix and self._checked_fix(message.fix))

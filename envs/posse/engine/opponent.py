@@ -209,7 +209,8 @@ def batches(
     A world depends on seed, split and its number alone; so does scenario k on seed, split and k. The other settings
     are those of :func:`batch`.
     """
-    check_count("num_worlds", num_worlds, 1), check_count("scenarios", scenarios, 1)
+    for name, count in (("num_worlds", num_worlds), ("scenarios", scenarios)):
+        check_count(name, count, 1)
     parts = shares(scenario_or_family(scenario), num_worlds, scenarios, seed, split)
     return [
         batch(one, len(part), seed=seed, split=split, first_world=first_world + part.start, **settings)

@@ -14,7 +14,7 @@ from posse_training.errors import DivergedError
 from posse_training.evaluation import evaluate
 from posse_training.train import train as module
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.train import train
+from posse_training.train.train import steps_made, train
 from posse_training.train.worlds import make_env
 
 
@@ -61,6 +61,7 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     assert schedule(1.0) == pytest.approx(1e-3)
     assert schedule(0.5) == pytest.approx(5.5e-4)
     assert schedule(0.0) == pytest.approx(schedule(-7.0)) == pytest.approx(1e-4)
+    assert steps_made(settings, env.num_envs) == env.num_envs * settings.rollout > 100
 
 
 def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
