@@ -21,12 +21,15 @@ class deploy:  # noqa: N801 (used as a function is)
         row: (F,) the robot's last observation.
 
     Raises:
-        PolicyError: The policy reads the state of the worlds, or does not fit the robot's scenario.
+        PolicyError: The policy reads the state of the worlds or the observations of all trackers together
+            (``whole_team``), or does not fit the robot's scenario.
     """
 
     def __init__(self, policy: Policy, robot: Robot) -> None:
         if policy.reads_state:
             raise PolicyError(f"policy {policy.name!r} reads the state of the worlds, which no robot measures")
+        if getattr(policy, "whole_team", False):
+            raise PolicyError(f"policy {policy.name!r} reads the observations of all trackers, and a robot has its own")
         self.policy, self.robot = policy, robot
         self.reset()
 

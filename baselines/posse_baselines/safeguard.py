@@ -44,16 +44,16 @@ class Guard(Minds):
         scenario = layout.scenario
         super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
 
-    def actions(self, observations: FloatArray, wanted: npt.ArrayLike, clip: bool = False) -> FloatArray:
+    def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
 
         Call it once a control step, with its observations (E, R, F). ValueError if the shape is another, or a number
-        is not in [-1, 1]; with ``clip``, it has to be finite.
+        is not in [-1, 1].
         """
         given = np.array(wanted, np.float32)
         if given.ndim != 3 or given.shape[:2] != self.me.shape or given.shape[2] < 2:
             raise ValueError(f"wanted velocities have shape {given.shape}, not {(*self.me.shape, 2)} or more")
-        allowed = np.isfinite(given) if clip else np.abs(given) <= _MOST
+        allowed = np.abs(given) <= _MOST
         if not allowed.all():
             raise ValueError(f"a wanted velocity of {given[~allowed][0]} is not a number in [-1, 1]: scale it")
         actions = np.ascontiguousarray(given.clip(-1, 1))
@@ -103,10 +103,8 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Advance by one control step with wanted velocities."""
         if self._guard is None:
             return self.env.step(action)  # which refuses it
-        wanted = np.asarray(action, np.float32)
-        clip = self.get_wrapper_attr("batch").clip_actions
-        motion = self._guard.actions(self._seen, np.array(wanted, ndmin=3), clip)
-        observation, *rest = self.env.step(motion.reshape(wanted.shape))
+        motions = self._guard.actions(self._seen, self.get_wrapper_attr("actions_of")(action))
+        observation, *rest = self.env.step(motions.reshape(self.action_space.shape or ()))
         self._seen = np.array(observation, ndmin=3)
         return observation, *rest
 
@@ -129,8 +127,8 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
         if self._guard is not None and self.env.agents:  # else the environment refuses the step
-            motions = self._guard.actions(self._seen, stack_agents(actions), self.env.unwrapped.batch.clip_actions)
-            actions = {**actions, **split_agents(motions, actions)}
+            wanted = self.env.unwrapped.actions_of(actions)[:, : self._seen.shape[1]]
+            actions = {**actions, **split_agents(self._guard.actions(self._seen, wanted), actions)}
         result: tuple[Any, Any, Any, Any, Any] = self.env.step(actions)
         self._seen = stack_agents(result[0])
         return result

@@ -62,10 +62,11 @@ def test_an_episode_unpickled_from_buffers_goes_on_as_before(name: str) -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"num_trackers": 1},
+        {"num_trackers": 1, "sonar_beams": 1},
         {"num_trackers": 7, "formation": "rows", "num_neighbours": 2},
         {"num_trackers": 64, "formation": "rows", "start_distance": (4.0, 30.0)},
         {"num_trackers": 3, "num_neighbours": 0, "sonar_beams": 0},
+        {"start_distance": (0.5, 0.53)},
         {"message_size": 9, "radio_range": 4.0, "radio_delay": 2, "radio_loss": 0.5},
     ],
 )
@@ -74,7 +75,7 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
     slow = name == "belief-planner" and settings.get("num_trackers") == 64  # each plans for all
     batch = batch_for(policy, "constant", 1 if slow else 2, **settings)
     reads = [field.name for field in policy.encoding.fields] if isinstance(policy, LearnedPolicy) else []
-    if "sonar" in reads and settings.get("sonar_beams") == 0:
+    if "sonar" in reads and "sonar_beams" in settings:
         with pytest.raises(PolicyError, match="sonar"):  # its network reads it
             begin(policy, batch)
         return

@@ -1,5 +1,6 @@
 """Robots that are given what the trackers of a world measure observe and do the same as those."""
 
+import copy
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -86,10 +87,14 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
 
 def test_what_is_older_than_the_first_observation_counts_as_of_then() -> None:
     robot, ages = Robot("constant", 0), []
-    for _ in range(6):
+    for k in range(6):
+        robot = copy.deepcopy(robot) if k == 3 else robot  # which goes on as the first
         row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(3.0, 0.0, 0.0, age=0.3))
         ages.append(float(robot.layout.views(row)["target_age"]))
     assert ages == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.3, 0.3])
+    for _ in range(robot.scenario.horizon):
+        row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0)
+    assert robot.layout.views(row)["time_left"] == 0.0  # it may go on longer than an episode
 
 
 def test_invalid_measurements_are_refused() -> None:

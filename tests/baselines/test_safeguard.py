@@ -151,6 +151,23 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
 
 
+def test_a_refused_step_changes_nothing() -> None:
+    """What stands in the way is remembered from step to step; a step that the environment refuses is none."""
+    seen: list[list[Any]] = [[], []]
+    for refused, rows in enumerate(seen):
+        env = Safeguard(posse.parallel_env("duel", target_motion="agent", num_obstacles=4, arena=14.0))
+        observations, _ = env.reset(seed=2)
+        rng = np.random.default_rng(0)
+        for _ in range(60):
+            actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in env.agents}
+            if refused:
+                with pytest.raises(ValueError, match="target_0"):
+                    env.step({**actions, "target_0": [5.0, 0.0]})
+            observations, *_ = env.step(actions)
+            rows.append(np.stack(list(observations.values())))
+    np.testing.assert_array_equal(seen[0], seen[1])
+
+
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))

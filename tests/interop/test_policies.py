@@ -9,7 +9,7 @@ from stable_baselines3 import DQN, PPO
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse_baselines import PolicyError, begin, from_function, load
+from posse_baselines import PolicyError, begin, deploy, from_function, load
 from posse_baselines.learned import Encoding
 from posse_baselines.learned.inputs import Encoder
 from posse_baselines.safeguard import Guard
@@ -43,6 +43,12 @@ def test_discrete_actions_and_absent_messages_are_played() -> None:
     chosen = model.predict(observations.reshape(10, -1), deterministic=True)[0].reshape(2, 5)
     np.testing.assert_array_equal(actions[..., :2], MOTIONS[chosen])
     assert not actions[..., 2:].any()
+
+
+def test_no_robot_alone_plays_the_model_of_a_team() -> None:
+    model = PPO("MlpPolicy", gymnasium.make("posse/Team-v0"), device="cpu")
+    with pytest.raises(PolicyError, match="reads the observations of all trackers"):
+        deploy(from_sb3(model), posse.Robot("constant", 0))
 
 
 @pytest.mark.parametrize("safeguard", [False, True])

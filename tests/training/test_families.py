@@ -31,6 +31,11 @@ def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: i
     )
 
 
+def test_a_split_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="splits are: train, validation, test"):
+        OPEN.draw(0, 0, "training")
+
+
 def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
     speeds = np.array([OPEN.draw(k).target_speed for k in range(400)])
     assert abs(speeds.mean() - 0.5) < 0.02
@@ -53,6 +58,7 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
         ({"num_trackers": (3, 5)}, "need num_neighbours"),
         ({"horizon": (100, 200)}, "cannot vary horizon"),
         ({"target_motion": ("smart", "constant")}, "one number"),
+        ({"arena": ((10.0, 20.0), (20.0, 30.0))}, "one number"),
         ({"num_obstacles": (0, 1.5)}, "whole number"),
         ({"sensing_range": (3.0, np.inf)}, "must be finite"),
     ],

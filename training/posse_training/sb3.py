@@ -46,6 +46,9 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         normalize: The wrapper whose statistics it learned with, if any.
         safeguard: Whether it learned behind the safeguard, as in ``TeamVecEnv(..., safeguard=True)``.
 
+    Attributes:
+        whole_team: Whether one observation is that of all trackers, so that no robot can play it alone.
+
     Raises:
         PolicyError: Spaces that no environment of posse has.
     """
@@ -73,7 +76,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
                 "learned on (F,) or (N, F)"
             )
         self._discrete = isinstance(model.action_space, (spaces.Discrete, spaces.MultiDiscrete))
-        self._whole_team = len(shape) == 2
+        self.whole_team = len(shape) == 2
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states."""
@@ -81,7 +84,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         encoder = None if self._encoding is None else Encoder(self._encoding, layout, num_worlds)
         size = layout.size if self._encoding is None else self._encoding.size
         wanted = self.model.observation_space.shape
-        got = (layout.scenario.num_trackers, size) if self._whole_team else (size,)
+        got = (layout.scenario.num_trackers, size) if self.whole_team else (size,)
         if wanted != got:
             raise PolicyError(
                 f"policy {self.name!r} learned on observations {wanted}, and those of scenario "
@@ -89,7 +92,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
                 f"{got}: give from_sb3 the message_size that it learned with, and the scenario "
                 "its settings"
             )
-        rows = num_worlds * (1 if self._whole_team else layout.scenario.num_trackers)
+        rows = num_worlds * (1 if self.whole_team else layout.scenario.num_trackers)
         guard = Guard(layout, num_worlds) if self._safeguard else None
         return layout, num_worlds, encoder, guard, None, np.ones(rows, np.bool_)
 
@@ -109,7 +112,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         trackers = seen.shape[1]
         if encoder is not None:
             seen = encoder.encode(seen)
-        rows = seen if self._whole_team else seen.reshape(worlds * trackers, -1)
+        rows = seen if self.whole_team else seen.reshape(worlds * trackers, -1)
         if self._normalize is not None:
             rows = np.asarray(self._normalize.normalize_obs(rows))
         chosen, states = self.model.predict(rows, state=states, episode_start=begins, deterministic=True)

@@ -29,7 +29,8 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded  # n
 from torchrl.envs import EnvBase  # noqa: E402
 
 import posse  # noqa: E402
-from posse.adapters.actions import MOTIONS, agent_names, single_action_space  # noqa: E402
+from posse.adapters.actions import MOTIONS, agent_names, as_motions, single_action_space  # noqa: E402
+from posse.engine.arguments import check_count  # noqa: E402
 from posse.signals.layout import StateLayout  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.safeguard import Guard  # noqa: E402
@@ -60,14 +61,14 @@ class PosseEnv(EnvBase):
         safeguard: Whether the trackers' actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
-            and any setting of the scenario, but not ``autoreset``.
+            ``target_policy``, and any setting of the scenario, but not ``autoreset`` and ``team_policy``.
 
     Attributes:
         batch: The engine, with the layout, the state and the metrics.
         group_map: The agents' names by group.
 
     Raises:
-        TypeError: ``autoreset`` among the settings.
+        TypeError: ``autoreset`` or ``team_policy`` among the settings.
         PolicyError: ``safeguard`` with discrete actions, which are no velocities.
         ScenarioError: ``discrete_actions`` with messages, which are not discrete.
         ValueError: As :func:`posse.batch`.
@@ -89,16 +90,18 @@ class PosseEnv(EnvBase):
                 f"autoreset={settings['autoreset']!r} cannot be set: TorchRL itself resets worlds "
                 "that are done; leave it out"
             )
+        if "team_policy" in settings:
+            raise TypeError("team_policy= is not possible: a PosseEnv has trackers; make its target an agent")
         self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)
         single_action_space(self.batch.scenario, discrete_actions)  # raises if impossible
         super().__init__(device=device, batch_size=(num_worlds,))
         self._state_layout = StateLayout(self.batch.scenario) if state else None
-        self._motions = torch.from_numpy(MOTIONS).to(self.device) if discrete_actions else None
+        self._discrete = discrete_actions
         if safeguard and discrete_actions:
             raise PolicyError("discrete actions are no velocities: set safeguard or discrete_actions to False")
         self._guard = Guard(self.batch.layout, num_worlds) if safeguard else None
         trackers = self.batch.scenario.num_trackers
-        names = agent_names(self.batch.scenario)
+        names = agent_names(self.batch.scenario)[: self.batch.action_shape[1]]
         self._rows = {TRACKERS: slice(0, trackers)}
         if len(names) > trackers:
             self._rows[TARGET] = slice(trackers, None)
@@ -119,8 +122,8 @@ class PosseEnv(EnvBase):
             )
             each: Bounded | Categorical = (
                 Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32)
-                if self._motions is None
-                else Categorical(len(self._motions), (worlds, count), dtype=torch.int64)
+                if not self._discrete
+                else Categorical(len(MOTIONS), (worlds, count), dtype=torch.int64)
             )
             action[group] = Composite(action=each, shape=(worlds, count))
             reward[group] = Composite(reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count))
@@ -135,7 +138,7 @@ class PosseEnv(EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""
-        self._seed = seed
+        self._seed = None if seed is None else check_count("seed", seed, 0)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
@@ -146,12 +149,13 @@ class PosseEnv(EnvBase):
         seed, options = kwargs.get("seed", self._seed), kwargs.get("options")
         mask = np.ones(self.batch.num_worlds, np.bool_)
         marks = None if tensordict is None else tensordict.get("_reset", None)
-        if marks is None or bool(marks.all()):
-            self._seed = None
-        else:
+        if marks is not None:
             mask = marks.reshape(self.batch.num_worlds).cpu().numpy()
+        if not mask.all():
             seed, options = kwargs.get("seed"), {**(options or {}), "reset_mask": mask}
         observations = self.batch.reset(seed=seed, options=options)
+        if mask.all():
+            self._seed = None
         if self._guard is not None:
             self._guard.restart(mask)
         self._seen = observations[:, self._rows[TRACKERS]]
@@ -164,15 +168,16 @@ class PosseEnv(EnvBase):
                 "break_when_any_done=False), which resets worlds that are done, instead of "
                 "break_when_all_done=True"
             )
-        actions = [tensordict.get((group, "action")) for group in self._rows]
-        together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
-        if self._motions is not None:
-            together = self._motions[together]
-        actions_of_all = together.detach().cpu().numpy()
+        by_group = [tensordict.get((group, "action")) for group in self._rows]
+        together = by_group[0] if len(by_group) == 1 else torch.cat(by_group, dim=1)
+        given, shape = together.detach().cpu().numpy(), self.batch.action_shape
+        actions = self.batch.actions_of(
+            as_motions("the array of actions", given, shape[:2] if self._discrete else shape, self._discrete)
+        )
         if self._guard is not None:
-            motions = self._guard.actions(self._seen, actions_of_all[:, self._rows[TRACKERS]])
-            actions_of_all = np.concatenate([motions, actions_of_all[:, motions.shape[1] :]], axis=1)
-        observations, rewards, *_ = self.batch.step(actions_of_all)
+            motions = self._guard.actions(self._seen, actions[:, self._rows[TRACKERS]])
+            actions = np.concatenate([motions, actions[:, motions.shape[1] :]], axis=1)
+        observations, rewards, *_ = self.batch.step(actions)
         self._seen = observations[:, self._rows[TRACKERS]]
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)

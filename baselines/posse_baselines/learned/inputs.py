@@ -20,7 +20,7 @@ from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Record
 from posse_baselines.ddcs.memory import offsets_of
 from posse_baselines.laws.steering import Work, work_for
 from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, Known, write_features
-from posse_baselines.policy import PolicyError
+from posse_baselines.policy import PolicyError, check_observations
 
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
@@ -156,7 +156,7 @@ class Encoder(OwnArrays):
     def __init__(
         self, encoding: Encoding, layout: ObservationLayout, num_worlds: int, robots: int | None = None
     ) -> None:
-        self.encoding = encoding
+        self.encoding, self.layout = encoding, layout
         self.estimates = np.zeros((num_worlds, robots or layout.scenario.num_trackers), ESTIMATE)
         self.estimates["age"] = -1.0
         self._columns, self._unknown = encoding.columns(layout)
@@ -180,9 +180,10 @@ class Encoder(OwnArrays):
     def encode(self, observations: FloatArray, out: FloatArray | None = None, worlds: Any = ...) -> FloatArray:
         """Return observations (worlds, R, F) of all worlds, or of those, as (rows, size), written to ``out`` if given.
 
-        Call it once a control step.
+        Call it once a control step. PolicyError if the observations have another shape.
         """
-        rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
+        robots = self.estimates[worlds].shape
+        rows = check_observations("encoder", observations, robots, self.layout).reshape(-1, self.layout.size)
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
         if (count := self.encoding.num_features) > 0:

@@ -62,7 +62,9 @@ class _Told(NamedTuple):
 
 def believed(scenario: Scenario) -> Scenario:
     """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
+    near, far = scenario.start_distance
     return scenario.replace(
+        start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # never plays, always drawn
         sensor="range-bearing",
         sonar_beams=0,
         num_neighbours=0,

@@ -76,7 +76,7 @@ class Pursuit(BasePolicy):
         # What is ahead within the keep-away width turns it aside, and slows it.
         angles = 2.0 * np.pi * np.arange(s.sonar_beams) / max(1, s.sonar_beams)
         if (ahead := np.cos(angles) > 0.3).any():
-            closeness = 1.0 - v["sonar"][..., ahead] / _KEEP_AWAY
+            closeness = 1.0 - v["sonar"].reshape(*turn.shape, -1)[..., ahead] / _KEEP_AWAY
             near, left = closeness > 0.0, np.where(angles[ahead] <= np.pi, 1.0, -1.0)
             speed = np.minimum(speed, np.where(near, 0.8 * (1.0 - closeness), 1.0).min(axis=-1))
             turn = turn - np.where(near, left * (0.5 + closeness), 0.0).sum(axis=-1)

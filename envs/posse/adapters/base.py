@@ -50,6 +50,7 @@ class BatchEnv:
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
+    closed: bool = False
     _rows: int | slice = slice(None)
     """The robots that an agent moves, as rows of the batch: one, or all."""
     _fit: Callable[..., Scenario] = staticmethod(get_scenario)
@@ -159,6 +160,7 @@ class BatchEnv:
         for renderer in self._renderers.values():
             renderer.close()
         self._renderers.clear()
+        self.closed = True
 
 
 class WorldEnv(BatchEnv):

@@ -82,11 +82,15 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         """Advance the world by one control step; errors are those of :meth:`posse.Batch.step`."""
         batch, own = self.batch, self._own
         batch.check_running()
-        motions = as_motions("action", action, self._shape, self._discrete)
-        self._advance(in_box(motions[self._as_batch], batch.clip_actions))
+        self._advance(self.actions_of(action))
         rewards = own.rewards.tolist()
         ends = (own.terminated.item(), own.truncated.item()) if batch._over else (False, False)
         return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
+
+    def actions_of(self, action: Any) -> FloatArray:
+        """Return an action as an array (1, rows, 2 + m) in [-1, 1]; ValueError as for :meth:`step`."""
+        motions = as_motions("action", action, self._shape, self._discrete)
+        return in_box(motions[self._as_batch], self.batch.clip_actions)
 
     def _info(self) -> dict[str, Any]:
         info, terms = self._common_info(), self._own.terms

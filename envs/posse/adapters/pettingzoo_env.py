@@ -99,7 +99,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """
         agents, batch, own = self.agents, self.batch, self._own
         batch.check_running()
-        self._advance(in_box(self._read(actions), batch.clip_actions, self._place))
+        self._advance(self.actions_of(actions))
         terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
         if batch._over:
             (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
@@ -111,6 +111,10 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             truncations,
             self._infos_of(agents),
         )
+
+    def actions_of(self, actions: Mapping[str, Any]) -> FloatArray:
+        """Return the actions of a step as an array (1, agents, 2 + m) in [-1, 1]; ValueError as for :meth:`step`."""
+        return in_box(self._read(actions), self.batch.clip_actions, self._place)
 
     def _infos_of(self, agents: list[str]) -> _AgentInfos:
         """Return the infos of the last step or reset."""
@@ -170,6 +174,6 @@ def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> Team
 def env(scenario: str | Scenario = "constant", **settings: Any) -> AECEnv[str, Any, Any]:
     """Return :class:`TeamParallelEnv` as a PettingZoo AEC environment.
 
-    Once the last agent has acted, all actions are checked and the world advances.
+    Once the last agent has acted, all actions are checked and the world advances; after an error only a reset helps.
     """
     return parallel_to_aec(TeamParallelEnv(scenario, **settings))

@@ -113,11 +113,14 @@ class Robot:
         """Forget everything: the next observation is the first of an episode."""
         self._world.reset(seed=0)
         arrays = self._world.arrays
-        self._me = arrays.tracker[0, self.number]
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
         self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
         self._said: tuple[float, ...] = (0.0,) * self.scenario.message_size
+
+    @property
+    def _me(self) -> Any:
+        return self._world.arrays.tracker[0, self.number]
 
     def observe(
         self,

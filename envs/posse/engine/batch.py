@@ -33,8 +33,9 @@ from posse.engine.kernels import (
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
-from posse.rules.state import NEVER, SPLITS, WorldArrays
+from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios.setting import SPLITS
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
 
@@ -239,7 +240,7 @@ class Batch(OwnArrays):
             seed: Start over from episode 0 of this seed; ``None``: each world's next episode.
             options: ``"reset_mask"`` (E,) bool: only these worlds, possibly none;
                 ``"tracker_pose"`` (N, 3) or (E, N, 3) and ``"target_pose"`` (3,) or (E, 3):
-                start from these (x, y, θ).
+                start from these (x, y, θ). Poses that are not given are drawn as without them.
 
         Raises:
             ResetNeeded: A mask at the first reset.
@@ -335,8 +336,7 @@ class Batch(OwnArrays):
                 changed.
         """
         self.check_running()
-        actions = in_box(as_float32("the array of actions", actions, self.action_shape), self.clip_actions)
-        results = self._new_results()
+        actions, results = self.actions_of(actions), self._new_results()
         begun = self._over > 0 and self.autoreset == "next_step"
         over = self._advance(actions, results) > 0
         observations, rewards, terms, scores, terminated, truncated = results
@@ -357,6 +357,10 @@ class Batch(OwnArrays):
                 self._started = False  # only a reset helps
                 raise
         return observations, rewards, terminated, truncated, infos
+
+    def actions_of(self, actions: npt.ArrayLike) -> FloatArray:
+        """Return actions as :meth:`step` takes them, (E, rows, 2 + m) float32 in [-1, 1]; its ValueError for others."""
+        return in_box(as_float32("the array of actions", actions, self.action_shape), self.clip_actions)
 
     def _infos_of(self, scores: npt.NDArray[Any], terms: FloatArray) -> dict[str, Any]:
         """Return the infos of scores (E,) and terms (E, rows, K) while episodes go on."""

@@ -6,8 +6,9 @@ The names below are public: records, constants and functions for policies and us
 from posse.rules.kinematics import arc
 from posse.rules.randomness import SENSOR_NOISE, TARGET, between, normal_pair, uniform
 from posse.rules.score import place
-from posse.rules.state import CONFIG, NEVER, SPLITS, TRACKER, beam_directions, config_record, slot_records, world_record
+from posse.rules.state import CONFIG, NEVER, TRACKER, beam_directions, config_record, slot_records, world_record
 from posse.rules.targets.smart import DART_TURN, PATIENCE
+from posse.scenarios.setting import SPLITS
 
 __all__ = [
     "CONFIG",

@@ -16,8 +16,8 @@ _BREAKS: Final = 1000  # first index of the draws for breaks
 
 @compiled
 def _drawn_step(c: Record, w: Record, earliest: int, index: int) -> int:
-    """Return a control step drawn from the rest of the window in which trackers break."""
-    width = max(0, c.break_until - earliest)
+    """Return a control step drawn from the rest of the window in which trackers break, one after the other."""
+    width = max(0, min(c.break_until, c.horizon - w.breaks_left) - earliest)
     return int(earliest + np.int32(np.float32(width) * uniform(w.key, 0, FAULTS, index)))
 
 

@@ -24,7 +24,6 @@ from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
 from posse.scenarios.scenario import FAR, FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
 
-SPLITS: Final = ("train", "validation", "test")
 BIT: Final = np.uint64(1)
 NO_BITS: Final = np.uint64(0)
 NEVER: Final = np.int32(2**30)

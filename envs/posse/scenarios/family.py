@@ -14,7 +14,7 @@ import numpy as np
 from posse.declarations import unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import ScenarioError, UnknownSettingError, fail
+from posse.scenarios.setting import SPLITS, ScenarioError, UnknownSettingError, fail
 
 Range = tuple[float, float]
 """Least and greatest value of a setting, both included."""
@@ -87,6 +87,8 @@ class Family:
         for name, value in whole.items():
             if not isinstance(value, int | np.integer) or value < 0:
                 fail(name, value, "it must be a whole number, at least 0")
+        if split not in SPLITS:
+            fail("split", split, f"splits are: {', '.join(SPLITS)}")
         shares = np.random.default_rng([seed, *f"{split}".encode(), index]).random(len(self.ranges))
         values: dict[str, float] = {}
         for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):
@@ -113,7 +115,8 @@ def _accepted(name: str, bounds: Range) -> Range:
         fail(name, bounds, "a range must be two numbers, (least, greatest)")
     if name in _FIXED:
         fail(name, bounds, f"a family cannot vary {name}, {_FIXED[name]}: set it on its base")
-    if "int" not in known[name].kind and not known[name].kind.startswith("float"):
+    several = any(isinstance(value, (tuple, list)) for value in bounds)
+    if several or ("int" not in known[name].kind and not known[name].kind.startswith("float")):
         fail(name, bounds, "a family varies settings that are one number")
     low, high = (known[name].accept(name, value) for value in bounds)
     if not low <= high < math.inf:

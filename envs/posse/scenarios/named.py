@@ -162,7 +162,8 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     elif scenario in tuple(SCENARIOS):  # also of what is not hashable
         found = Scenario(name=scenario, **SCENARIOS[scenario])
     else:
-        raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
+        families = "; families, as those of posse.family_names(), are for gymnasium.make_vec and posse.batches"
+        raise ScenarioError(unknown("scenario", scenario, SCENARIOS) + families)
     if "horizon" in overrides and "settle_time" not in overrides:
         at_once = found.replace(settle_time=1e-9, **overrides)  # shorter than any episode
         return at_once.replace(settle_time=min(found.settle_time, at_once.duration))

@@ -463,6 +463,8 @@ def _in_time_and_space(s: Scenario) -> _Conflicts:
         come = f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most {FARTHEST:g} m"
         others = f"tracker_speed={fastest:g}, control_step={s.control_step:g} or start_distance={s.start_distance}"
         yield "horizon", f"{come} is possible: lower it, {others}, or set an arena"
+    if s.breaks and round(s.break_window[0] * s.horizon) + s.breaks > s.horizon:
+        yield "break_window", f"it begins too late for breaks={s.breaks} in {s.horizon} steps: let it begin earlier"
     if s.start_distance[0] <= 2 * s.robot_radius:
         yield "start_distance", f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m"
     if s.num_obstacles and not s.walled:

@@ -8,11 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from numbers import Integral, Real
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
 import numpy as np
 
 from posse.declarations import unknown
+
+SPLITS: Final = ("train", "validation", "test")
+"""Parts of all worlds, which have none in common."""
 
 
 class ScenarioError(ValueError):

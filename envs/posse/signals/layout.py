@@ -105,7 +105,6 @@ _Values = npt.NDArray[Any]
 _POSE: Final = {"x": "m", "y": "m", "heading_cos": "1", "heading_sin": "1", "speed": "m/s", "turn_rate": "rad/s"}
 _FIX: Final = {"fix_x": "m", "fix_y": "m", "fix_cos": "1", "fix_sin": "1", "fix_frame_cos": "1", "fix_frame_sin": "1"}
 _FRAME: Final = {"frame_cos": "1", "frame_sin": "1", "goal_cos": "1", "goal_sin": "1"}
-_ODOMETRY: Final = {"x": "m", "y": "m", "heading": "rad"}
 
 
 class StateEntry(NamedTuple):
@@ -174,6 +173,11 @@ class StateLayout:
         return views
 
 
+def _errors(s: Scenario) -> dict[str, str]:
+    """Return the errors of a pose that drifts, with their units."""
+    return {"odometry_x": "m", "odometry_y": "m", "odometry_heading": "rad"} if s.drifts else {}
+
+
 def _entries(s: Scenario) -> list[StateEntry]:
     """Return every entry, in order; control steps become times in s."""
     memory = [each for motion in Declarations.of(s).motions for each in motion.memory]
@@ -192,7 +196,7 @@ def _entries(s: Scenario) -> list[StateEntry]:
         ("tracker_sensor_dead_from", "s", "start of its sensor's outage; -1: none", "tracker_sensor_dead_from"),
         ("tracker_radio_dead_from", "s", "start of its radio's outage; -1: none", "tracker_radio_dead_from"),
         ("tracker_sees", "1", "1 while it sees the target", "tracker_sees"),
-        *((f"odometry_{k}", u, "error of each own pose", f"odometry_{k}") for k, u in _ODOMETRY.items()),
+        *((k, u, "error of each own pose", k) for k, u in _errors(s).items()),
         ("command", "1", "actions not yet executed, newest first", "command"),
         *((f"obstacle_{k}", "m", f"each obstacle's {k}", f"obstacle_{k}") for k in ("x", "y", "radius")),
         ("message", "1", "policies' messages, newest first", "message"),
@@ -202,5 +206,6 @@ def _entries(s: Scenario) -> list[StateEntry]:
         ("sent", "1", "1: a message was sent; in flight, newest first", "broadcast_sent"),
         ("sent_fix_time", "s", "time of the fix sent; -1: none", "broadcast_fix_step"),
         *((f"sent_{k}", unit, "as sent, newest first", f"broadcast_{k}") for k, unit in {**_POSE, **_FIX}.items()),
+        *((f"sent_{k}", u, "error of the pose sent", f"broadcast_{k}") for k, u in _errors(s).items()),
     ]
     return [StateEntry(*row) for row in rows]

@@ -167,7 +167,7 @@ def arena_height(c: Record) -> np.float32:
 @field("s", 0, lambda s: s.duration * SLACK)
 def time_left(c: Record, v: View) -> Lanes:
     """Time until the episode is truncated."""
-    return (np.float32(c.horizon) - v.step) * c.control_step
+    return greater(np.float32(c.horizon) - v.step, ZERO) * c.control_step  # a real robot may go on longer
 
 
 # The target

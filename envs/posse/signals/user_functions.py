@@ -75,7 +75,7 @@ def _fits(found: Any, returns: str) -> bool:
     if returns == "True or False":
         return isinstance(found, (types.Integer, types.Boolean))
     if returns == "a number":
-        return isinstance(found, (types.Number, types.Boolean, LanesType))
+        return isinstance(found, (types.Integer, types.Float, types.Boolean, LanesType))
     numbers = [_fits(each, "a number") for each in found] if isinstance(found, types.BaseTuple) else []  # type: ignore[attr-defined]
     return all(numbers) and returns == f"{len(numbers)} numbers"
 

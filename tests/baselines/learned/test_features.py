@@ -10,7 +10,7 @@ from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
-from posse_baselines import rollout
+from posse_baselines import PolicyError, rollout
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.learned.network import LIMIT
@@ -24,6 +24,8 @@ def test_names_are_those_of_views() -> None:
         field, _, at = name.rstrip("]").partition("[")
         index = tuple(int(i) for i in at.split(", ") if i)
         np.testing.assert_array_equal(views[field][(..., *index)].ravel(), column)
+    with pytest.raises(PolicyError, match=r"shape \(12, 5"):
+        Encoder(Encoding.of(batch.layout, "features"), batch.layout, 6).encode(np.concatenate([observations] * 2))
 
 
 def test_longer_messages_than_it_uses_change_nothing() -> None:

@@ -145,3 +145,11 @@ def test_the_nearest_to_the_target_break_one_after_the_other_within_the_window()
     assert (np.diff(times[:, :3], axis=1) >= 1).all(), "one at a time"
     assert (times[:, 2] <= 62).all(), "the window is not left, but for a step each"
     assert np.ptp(times[:, 0]) > 25, "the first is drawn from all of the window"
+
+
+def test_all_break_even_in_the_last_steps() -> None:
+    batch = posse.batch("leader-loss", 100, breaks=4, break_window=(0.9, 1.0), horizon=60, autoreset="disabled")
+    batch.reset(seed=3)
+    for _ in range(60):
+        batch.step(np.zeros(batch.action_shape))
+    assert (broken(batch).sum(axis=1) == 4).all()

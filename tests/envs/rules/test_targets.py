@@ -10,6 +10,7 @@ import pytest
 from tests.support.reference.state import Array, Complexes, directions, points
 
 import posse
+from posse.rules.targets.smart import SMART_REPLAN
 
 Team = Callable[[posse.Batch], npt.NDArray[Any]]
 SPEED = 0.6
@@ -127,6 +128,16 @@ def test_the_target_darts_at_a_team_in_formation_and_not_before() -> None:
     # ... and then round, by more than a right angle, within the time an about-turn takes.
     assert away.max(axis=0).min() > np.radians(90)
     assert np.argmax(away > np.radians(60), axis=0).max() < 50
+
+
+def test_a_tracker_that_spins_much_faster_than_the_target_turns_does_not_switch_darts_off() -> None:
+    batch = posse.batch("smart", 20, target_turn_rate=0.3, tracker_turn_rate=10.0)
+    batch.reset(seed=1)
+    for step in range(SMART_REPLAN + 1):
+        batch.arrays.world["pressed"] = 10.0 * (step > 0)
+        before = points(batch, "world", "goal_cos", "goal_sin")
+        batch.step(np.tile(np.array([-1, 1], np.float32), (20, 5, 1)))
+    assert (np.abs(points(batch, "world", "goal_cos", "goal_sin") - before) > 0.1).mean() > 0.8
 
 
 def test_the_target_escapes_trackers_that_enclose_it() -> None:

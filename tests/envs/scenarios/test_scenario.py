@@ -44,6 +44,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"start_distance": (0.2, 3.0)}, "clear of the target"),
     ({"breaks": 5}, "num_trackers - 1"),
     ({"breaks": 2, "break_choice": "given"}, "break_number"),
+    ({"breaks": 2, "break_window": (1.0, 1.0)}, "begins too late for breaks=2"),
     ({"break_number": 5, "break_choice": "given", "breaks": 1}, "0 to 4"),
     ({"extra_fields": ("speed",)}, "in every observation"),
     ({"metrics": ("score", "score")}, "each once"),

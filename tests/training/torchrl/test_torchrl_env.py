@@ -12,7 +12,7 @@ from torchrl.envs.utils import check_env_specs
 import posse
 from posse.adapters.actions import MOTIONS
 from posse.signals.layout import StateLayout
-from posse_baselines import PolicyError
+from posse_baselines import PolicyError, load, load_target
 from posse_baselines.safeguard import Guard
 from posse_training.torchrl import PosseEnv
 
@@ -37,6 +37,7 @@ def test_specs_hold(scenario: str, size: int) -> None:
 
 
 def test_specs_hold_where_the_target_is_an_agent() -> None:
+    check_env_specs(PosseEnv("duel", WORLDS, target_policy=load_target("evader").policy, **SHORT), seed=1)
     env = PosseEnv("constant", WORLDS, target_motion="agent", num_trackers=3, **SHORT)
     check_env_specs(env, seed=1)
     assert env.group_map == {"agents": ["tracker_0", "tracker_1", "tracker_2"], "target": ["target_0"]}
@@ -54,6 +55,8 @@ def test_the_state_and_discrete_actions() -> None:
     observations, *_ = batch.step(MOTIONS[numbers])
     np.testing.assert_array_equal(carried["agents", "observation"].numpy(), observations)
     np.testing.assert_array_equal(carried["state"].numpy(), layout.vector(batch.arrays))
+    with pytest.raises(ValueError, match="is -1, outside 0 to 14"):
+        env.step(carried.set(("agents", "action"), torch.from_numpy(np.full((WORLDS, 5), -1))))
     with pytest.raises(posse.ScenarioError, match="discrete_actions=True cannot encode messages"):
         PosseEnv("field", WORLDS, discrete_actions=True, message_size=1)
 
@@ -105,9 +108,20 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     assert env.batch.worlds["episode"].tolist() == [0, 1, 0, 1, 1, 0]
 
 
-def test_a_choice_of_autoreset_is_refused() -> None:
+def test_a_choice_of_autoreset_or_of_a_team_is_refused() -> None:
     with pytest.raises(TypeError, match=r"autoreset='same_step'.*leave it out"):
         PosseEnv("constant", WORLDS, autoreset="same_step")
+    with pytest.raises(TypeError, match="team_policy= is not possible"):
+        PosseEnv("constant", WORLDS, team_policy=load("pursuit"))
+
+
+def test_a_seed_outlives_a_refused_reset() -> None:
+    env = PosseEnv("smart", WORLDS)
+    first = env.reset(seed=7)["agents", "observation"].clone()
+    env.set_seed(7)
+    with pytest.raises(ValueError, match="unknown option 'foo'"):
+        env.reset(options={"foo": 1})
+    assert torch.equal(env.reset()["agents", "observation"], first)
 
 
 def test_a_step_of_some_worlds_alone_is_refused() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import posse
+from posse_baselines import load
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.safeguard import Guard
 from posse_training.train.vec_env import TeamVecEnv
@@ -157,3 +158,20 @@ def test_invalid_batches_are_refused(batches: list[dict[str, Any]], message: str
     layout = posse.ObservationLayout(posse.get_scenario("constant"))
     with pytest.raises(ValueError, match=message):
         TeamVecEnv(made, Encoding.of(layout))
+    moved = posse.batch("constant", 1, autoreset="disabled", team_policy=load("pursuit"))
+    with pytest.raises(ValueError, match="see_state needs all trackers moved from outside, here 1 are"):
+        TeamVecEnv([moved], Encoding.of(moved.layout), see_state=True)
+
+
+def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> None:
+    env = make(worlds=2)
+    env.set_options({"target_pose": (1.0, 2.0, 0.0), "tracker_pose": [(3.0 * i, 7.0, 0.0) for i in range(5)]})
+    for at in (True, False):
+        env.reset()
+        assert [batch.worlds["x"][0] == 1.0 for batch in env.batches] == [at, at]
+    wrong = np.zeros((10, 2))
+    wrong[9, 0] = np.nan
+    for actions, words in ((wrong, "nan"), (np.zeros((5, 4)), r"shape \(5, 4\), wanted \(10, 2\)")):
+        with pytest.raises(ValueError, match=words):
+            env.step(actions)
+    assert [batch.worlds["step"][0] for batch in env.batches] == [0, 0]

@@ -77,15 +77,22 @@ class TeamVecEnv(VecEnv):
     def reset(self) -> FloatArray:
         """Start an episode in every world; return the observations (slots, size).
 
-        A seed given by :meth:`seed` restarts the worlds from episode 0 of that seed, once.
+        A seed given by :meth:`seed` restarts the worlds from episode 0 of that seed, once, and options given by
+        :meth:`set_options` are those of :meth:`posse.Batch.reset`, once.
         """
-        observations = np.concatenate([group.reset(self._seeds[0]) for group in self._groups])
+        observations = np.concatenate([group.reset(self._seeds[0], self._options[0]) for group in self._groups])
         self._reset_seeds()
+        self._reset_options()
         return observations
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
-        """Take the actions (slots, 2 + m) of the next step."""
-        self._actions = actions
+        """Take the actions (slots, 2 + m) of the next step; ValueError as for :meth:`posse.Batch.step`."""
+        if actions.shape != (self.num_envs, self.action_length):
+            raise ValueError(f"actions have shape {actions.shape}, wanted {(self.num_envs, self.action_length)}")
+        parts = np.split(actions, np.cumsum([group.num_slots for group in self._groups])[:-1])
+        self._actions = [
+            batch.actions_of(part.reshape(batch.action_shape)) for batch, part in zip(self.batches, parts, strict=True)
+        ]
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, BoolArray, list[dict[str, Any]]]:
         """Step every world; return observations, rewards, dones and infos, one row a slot.
@@ -94,9 +101,7 @@ class TeamVecEnv(VecEnv):
         ``terminal_observation`` (size,), ``TimeLimit.truncated``, and for whole episodes
         ``episode`` (return, length, score), ``metrics`` and ``is_success`` (the team settled).
         """
-        ends = np.cumsum([group.num_slots for group in self._groups])
-        parts = np.split(self._actions, ends[:-1])
-        steps = [group.step(part) for group, part in zip(self._groups, parts, strict=True)]
+        steps = [group.step(part) for group, part in zip(self._groups, self._actions, strict=True)]
         observations, rewards, dones, infos, terms = zip(*steps, strict=True)
         for name, values in (item for told in terms for item in told.items()):
             total = self._terms.setdefault(name, [0.0, 0])
@@ -189,9 +194,9 @@ class SlotGroup:
         # Rewards of the present episode so far, (E, N).
         self._returns = np.zeros((worlds, trackers))
 
-    def reset(self, seed: int | None) -> FloatArray:
+    def reset(self, seed: int | None, options: dict[str, Any] | None = None) -> FloatArray:
         """Start a shortened episode in every world; return the observations (slots, size)."""
-        raw = self.batch.reset(seed=seed)
+        raw = self.batch.reset(seed=seed, options=options)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
         self._begin(np.ones(worlds, np.bool_))
         self._seen = raw
@@ -209,9 +214,11 @@ class SlotGroup:
     def step(
         self, actions: FloatArray
     ) -> tuple[FloatArray, FloatArray, BoolArray, list[dict[str, Any]], dict[str, FloatArray]]:
-        """Step every world; return observations, rewards, dones and infos, one row a slot, and the reward's terms."""
+        """Step every world by valid actions (E, N, 2 + m).
+
+        Returns observations, rewards, dones and infos, one row a slot, and the reward's terms.
+        """
         batch = self.batch
-        actions = actions.reshape(*batch.action_shape[:2], -1)
         if self._guard is not None:
             actions = self._guard.actions(self._seen, actions)
         raw, reward, terminated, truncated, told = batch.step(actions)

@@ -64,9 +64,14 @@ class StateWriter:
     Args:
         batch: The worlds.
         scenarios: States have places for the most trackers and obstacles that any of these has; missing ones are zeros.
+
+    Raises:
+        ValueError: A policy inside the batch moves trackers.
     """
 
     def __init__(self, batch: Batch, scenarios: Sequence[Scenario]) -> None:
+        if batch.action_shape[1] != batch.scenario.num_trackers:
+            raise ValueError(f"see_state needs all trackers moved from outside, here {batch.action_shape[1]} are")
         self._batch = batch
         self._config = config_record(batch.scenario)
         self._places = max(scenario.num_trackers for scenario in scenarios)

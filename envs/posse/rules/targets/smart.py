@@ -35,6 +35,7 @@ _FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by
 _LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
 _LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
 _DART_MOMENTS: Final = 6  # time samples of a simulated dart
+_DART_TURNS: Final = np.float32(4.0)  # times the target's turn rate; faster turns are simulated as this, for arc()
 _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
 _DART_STRIDE: Final = 2  # every second direction is simulated
@@ -167,6 +168,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
     displaces them farthest from their places around the target, without a collision.
     """
     moment = DART_TURN / (c.target_turn_rate * np.float32(_DART_MOMENTS))
+    fastest_turn = _DART_TURNS * c.target_turn_rate
     clear = c.robot_radius + c.robot_radius + _CLEARANCE
     best = np.float32(-1e9)
     for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
@@ -175,10 +177,11 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
         for t in trackers:
             hc, hs, tc, ts = w.heading_cos, w.heading_sin, t.heading_cos, t.heading_sin
             moved_x, moved_y = ZERO, ZERO  # displacement relative to the target
+            turn_rate = min(max(t.turn_rate, -fastest_turn), fastest_turn)
             for _ in range(_DART_MOMENTS):
                 old_c, old_s = hc, hs
                 hc, hs = follow_heading(hc, hs, ux, uy, _DART_TURN_COS, _DART_TURN_SIN)
-                dx, dy, tc, ts = arc(tc, ts, t.speed, t.turn_rate, moment)
+                dx, dy, tc, ts = arc(tc, ts, t.speed, turn_rate, moment)
                 moved_x += dx - HALF * c.target_speed * moment * (old_c + hc)
                 moved_y += dy - HALF * c.target_speed * moment * (old_s + hs)
                 x, y = t.x - w.x + moved_x, t.y - w.y + moved_y
