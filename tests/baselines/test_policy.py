@@ -180,6 +180,18 @@ def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy)
         policy.begin(posse.batch("constant", message_size=2).layout, 1)
 
 
+def test_the_script_refuses_a_sensor_of_bearings_alone() -> None:
+    @posse.sensor("by-bearing", fix="bearing")
+    def by_bearing(c: Any, w: Any, t: Any, dx: Any, dy: Any) -> bool:
+        """In sight everywhere."""
+        return True
+
+    layout = posse.ObservationLayout(posse.get_scenario("smart", sensor="by-bearing", message_size=5))
+    for name in ("ddcs-tuned", "belief-planner"):
+        with pytest.raises(PolicyError, match="sensor='by-bearing' measures bearings alone"):
+            load(name).begin(layout, 1)
+
+
 @pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])
 def test_observations_of_another_shape_are_refused(name: str) -> None:
     policy = load(name)

@@ -31,7 +31,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse import ObservationLayout, Scenario
+from posse import SENSORS, ObservationLayout, Scenario
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
 from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, unit_of
@@ -41,7 +41,7 @@ from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
-from posse_baselines.policy import Annotations, BasePolicy, Memory, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
 
 BASELINE: Final = Settings(
     model="centralized",
@@ -96,9 +96,12 @@ class DDCS(BasePolicy):
         return DDCS(self.settings.replace(**values), self.name)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` teams at the start; PolicyError if messages are too short."""
+        """Return the memory of ``num_worlds`` teams at the start; PolicyError if the scenario does not fit."""
         super().begin(layout, num_worlds)
         scenario = layout.scenario
+        if SENSORS[scenario.sensor].fix == "bearing":
+            why = f"sensor={scenario.sensor!r} measures bearings alone"
+            raise PolicyError(f"policy {self.name!r} follows positions of the target, and {why}: choose another sensor")
         return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:

@@ -20,11 +20,13 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.policies.planner import PlannerSettings, Search
-from posse_baselines.policy import Annotations, BasePolicy, Memory
+from posse_baselines.policy import Annotations, Memory
 from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
+_FIX_TRUST: Final = 0.2  # share of a noisy fix in where the target is then believed to be
+_FAR_OFF: Final = 0.5  # m; a fix this far from where the target was believed to be is taken as it is
 _HEADING_TRUST: Final = 0.1  # share of the difference from the believed heading of the slot frame that is corrected
 _LOST_AFTER: Final = 2.0  # s; age of a fix up to which the planned motion is played, then the script's
 _UNSEEN_DELAY: Final = 30.0  # s; by how much later slots are filled from which the target cannot be seen
@@ -84,15 +86,16 @@ class Beliefs(OwnArrays):
     """The belief worlds of E teams of N trackers, R = E N, and the search for the best way to play in them.
 
     Args:
-        settings: How it plans.
+        settings: How it plans; ``None``: by default.
         layout: Of the observations.
         num_worlds: E.
     """
 
-    def __init__(self, settings: PlannerSettings, layout: ObservationLayout, num_worlds: int) -> None:
+    def __init__(self, settings: PlannerSettings | None, layout: ObservationLayout, num_worlds: int) -> None:
         scenario = layout.scenario
         self.layout, self.dt = layout, scenario.control_step
         self.rows = num_worlds * scenario.num_trackers
+        self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
         window = 2 * scenario.radio_delay + 2 if self.late else 0
         assumed = believed(scenario)
@@ -115,7 +118,8 @@ class Beliefs(OwnArrays):
             np.zeros((*shape[:2], 4), np.complex64),
             np.zeros((window + 1, *self.now.action_shape), np.float32),
         )
-        self.search = Search(settings, self.now)
+        # With more rounds, plans of trackers that know different things differ more: 0.01 to 0.02 less on radio.
+        self.search = Search(settings or PlannerSettings(rounds=2 if self.late else 4), self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
         self.search.teams.late[:] = _UNSEEN_DELAY * (np.array(arms) > scenario.sensing_range)
         self.restart(np.ones(self.rows, np.bool_))
@@ -207,6 +211,10 @@ class Beliefs(OwnArrays):
         place, theta, frame, velocity = told.fix.T.astype(np.complex128)
         gap = (w["step"] - seen["step"]) * self.dt
         first = gap > _LOST_AFTER
+        if self.noisy:  # but one that is off by a turn that was not foreseen
+            foreseen = w["x"] + 1j * w["y"]
+            off = place - foreseen
+            place = foreseen + np.where(first | (np.abs(off) > _FAR_OFF), 1.0, _FIX_TRUST) * off
         noise = self.layout.scenario.heading_noise
         if noise > 0.0:  # it is the same of both headings, and how the slot frame turns is known
             error = np.angle(frame / (w["frame_cos"] + 1j * w["frame_sin"]))
@@ -281,7 +289,9 @@ def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 class _Memory(Minds):
     """Of the trackers as they monitor and search, and what they believe."""
 
-    def __init__(self, plans: PlannerSettings, layout: ObservationLayout, settings: Settings, num_worlds: int) -> None:
+    def __init__(
+        self, plans: PlannerSettings | None, layout: ObservationLayout, settings: Settings, num_worlds: int
+    ) -> None:
         super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
         self.beliefs = Beliefs(plans, layout, num_worlds)
 
@@ -302,16 +312,15 @@ class BeliefPlanner(DDCS):
 
     def __init__(self, settings: PlannerSettings | None = None) -> None:
         super().__init__(name="belief-planner")
-        # With more rounds, plans of trackers that know different things differ more: 0.01 to 0.02 less on radio.
-        self.plans = settings or PlannerSettings(rounds=2)
+        self.plans = settings
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings of ``ddcs-tuned`` for a scenario."""
         return tuned_settings("ddcs-tuned", scenario)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` teams at the start of an episode."""
-        BasePolicy.begin(self, layout, num_worlds)
+        """Return the memory of ``num_worlds`` teams at the start of an episode; PolicyError as for :class:`DDCS`."""
+        super().begin(layout, num_worlds)
         return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
