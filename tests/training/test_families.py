@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import posse
 from posse import ScenarioError
 from posse_training import evaluate
+from posse_training.evaluation.statistics import mean
 
 SHORT: dict[str, Any] = {"horizon": 40, "settle_time": 1.0}
 OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.0), **SHORT)
@@ -76,6 +77,7 @@ def test_results_do_not_depend_on_how_worlds_are_cut(monkeypatch: pytest.MonkeyP
         np.testing.assert_array_equal(column, parts[name], name)
     alone = evaluate("ddcs-distributed", OPEN.draw(1, 3, "test"), 20, 3, progress=False)
     np.testing.assert_array_equal(whole["score"][10:20], alone["score"][10:20], "worlds 10 to 19 play scenario 1")
+    assert whole.estimate("score") == mean(whole["score"], 10) != mean(whole["score"])
 
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])

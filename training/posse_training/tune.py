@@ -28,6 +28,7 @@ from posse_baselines.tuned import FORMAT
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import Estimate, mean
 from posse_training.files import hold_settings, intact, locked
 from posse_training.options import Ray
@@ -243,7 +244,7 @@ class _Run:
         """Return a point of the curve: settings, and their score on the validation worlds."""
         s, generation = self.settings, len(self.scores)
         (metrics,) = self._play([values], s.seed, "validation", range(s.validation_worlds))
-        found = mean(metrics["safe_score"])
+        found = mean(metrics["safe_score"], block_of(self.scenario))
         self.console.print(f"generation {generation:>4}  safe score {found}", markup=False, highlight=False)
         score = {"score": found.value, "low": found.low, "high": found.high}
         return {"generation": generation, **score, "settings": values}
@@ -274,7 +275,7 @@ class _Run:
         played = self._play([values, {}], s.seed + FRESH_SEED, "validation", range(s.validation_worlds))
         for name, metrics in zip(("tuned", "untuned"), played, strict=True):
             others = {metric: float(metrics[metric].mean()) for metric in ("score", "contact_free")}
-            scores[name] = {"safe_score": asdict(mean(metrics["safe_score"])), **others}
+            scores[name] = {"safe_score": asdict(mean(metrics["safe_score"], block_of(self.scenario))), **others}
         (checked,) = self._play([values], 2, "validation", range(32))
         check = {"split": "validation", "seed": 2, "worlds": 32, "safe_score": float(checked["safe_score"].mean())}
         return {

@@ -69,6 +69,17 @@ def test_the_interval_of_a_mean_agrees_with_the_normal_theory() -> None:
     assert estimate.high == pytest.approx(values.mean() + half, abs=0.02)
 
 
+def test_worlds_of_a_drawn_scenario_are_resampled_as_one() -> None:
+    rng = np.random.default_rng(4)
+    means, other = rng.normal(size=12), rng.normal(size=113)
+    values = np.repeat(means, 10)[:113]  # the last block is short
+    wanted = stats.t.interval(0.95, 11, means.mean(), stats.sem(means))
+    for found in (mean(values, 10), over_seeds(values, block=10), difference(values + other, other, 10)):
+        assert (found.low, found.high) == pytest.approx(wanted, abs=0.15)
+    assert difference([values, values], values + 1, 10).high == pytest.approx(-1)
+    assert mean([*values[:20], *[np.nan] * 10], 10).count == 20
+
+
 def test_episodes_in_which_it_never_happened_do_not_count() -> None:
     estimate = mean([1.0, np.nan, 3.0])
     assert (estimate.value, estimate.count) == (2.0, 2)
@@ -115,6 +126,7 @@ class TestTrainingSeeds:
         assert paired.value == pytest.approx(0.5, abs=0.02)
         assert paired.high - paired.low < 0.1
         assert over_seeds(trained).high - over_seeds(trained).low > 1
+        assert over_seeds([[1] * 20, [1] * 20, [0] * 10 + [1] * 10]).high == 1
         turned = difference(worlds, trained)
         assert turned.value == pytest.approx(-paired.value)
         assert turned.low == pytest.approx(-paired.high, abs=0.02)

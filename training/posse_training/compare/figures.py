@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from posse import Scenario
 from posse_training.compare.contenders import Contender, Plays
+from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import over_seeds, share
 from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain, save, subplots
 
@@ -57,7 +58,8 @@ def scores(plays: Found, looks: Looks) -> Figure:
         for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
-            score, style = over_seeds(plays[name, policy]["safe_score"]), looks[policy]
+            found, style = plays[name, policy], looks[policy]
+            score = over_seeds(found["safe_score"], block=block_of(found.scenario))
             y = row + (k - (len(policies) - 1) / 2) * 0.8 / len(policies)
             axis.plot([score.low, score.high], [y, y], color=style.colour, linewidth=1.4)
             axis.plot(score.value, y, **style.point)

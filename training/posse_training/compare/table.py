@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from posse_training.compare.contenders import Plays
-from posse_training.evaluation.results import Results
+from posse_training.evaluation.results import Results, block_of
 from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
 
 Row = dict[str, Any]
@@ -38,25 +38,26 @@ _SHORT: Final = ("safe_score", "of_planner", "contact_free", "difference", "impr
 def row_of(plays: Plays, reference: Plays | None) -> Row:
     """Return the estimates of one policy on one scenario; differences are of the safe score, to the reference."""
     gaps = None if reference is None else plays.paired(reference)
+    block = block_of(plays.scenario)
     return {
         "scenario": plays.scenario.name,
         "policy": plays.label,
         "seeds": len(plays.results),
-        "safe_score": over_seeds(plays["safe_score"]),
+        "safe_score": over_seeds(plays["safe_score"], block=block),
         "of_planner": None,  # filled in once the planner has played
-        "score": over_seeds(plays["score"]),
-        "contact_free": _share(plays["contact_free"] == 1),
-        "interquartile_mean": over_seeds(plays["safe_score"], middle_mean),
-        "bound": over_seeds(plays["bound"]),
-        "settled": _share(np.isfinite(plays["settling_time"])),
-        "difference": None if gaps is None else difference(*gaps),
-        "improvement": None if gaps is None else improvement(*gaps),
+        "score": over_seeds(plays["score"], block=block),
+        "contact_free": _share(plays["contact_free"] == 1, block),
+        "interquartile_mean": over_seeds(plays["safe_score"], middle_mean, block),
+        "bound": over_seeds(plays["bound"], block=block),
+        "settled": _share(np.isfinite(plays["settling_time"]), block),
+        "difference": None if gaps is None else difference(*gaps, block),
+        "improvement": None if gaps is None else improvement(*gaps, block),
     }
 
 
-def _share(happened: npt.NDArray[np.bool_]) -> Estimate:
+def _share(happened: npt.NDArray[np.bool_], block: int) -> Estimate:
     """Return the share of episodes in which something happened, (S, W)."""
-    return share(happened) if len(happened) == 1 else over_seeds(happened)
+    return share(happened) if len(happened) == block == 1 else over_seeds(happened, block=block)
 
 
 def ranked(rows: Sequence[Row]) -> list[Row]:

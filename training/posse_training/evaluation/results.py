@@ -12,10 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Family, Scenario
+from posse.scenarios.family import BLOCK
 from posse_baselines.files import write_atomically, write_json
 from posse_training.evaluation.statistics import Estimate, mean
 
 Column = npt.NDArray[np.float64]
+
+
+def block_of(given: Scenario | Family) -> int:
+    """Return how many worlds in a row play the same drawn scenario, and are resampled as one."""
+    return BLOCK if isinstance(given, Family) else 1
 
 
 @dataclass(frozen=True)
@@ -50,8 +56,11 @@ class Results:
         return self.columns[metric]
 
     def estimate(self, metric: str) -> Estimate:
-        """Return the mean of a metric over the episodes that have it, with its 95 % interval."""
-        return mean(self[metric])
+        """Return the mean of a metric over the episodes that have it, with its 95 % interval.
+
+        Of a family, drawn scenarios are resampled, ten worlds each: the interval is for other scenarios of it.
+        """
+        return mean(self[metric], block_of(self.scenario))
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one dictionary for each episode."""
