@@ -6,6 +6,7 @@ Everything is kept in the folder, so that the same command resumes a league that
 from __future__ import annotations
 
 import csv
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -42,7 +43,7 @@ TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed."""
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
-_FREE: Final = ("generations", "responses", "longer", "episodes")
+_FREE: Final = ("generations", "responses", "episodes")
 """Settings that the command that resumes a league may change."""
 _STEPS: Final = (1, 10**12)
 _COLUMNS: Final = 4  # of targets, which fit into 80 characters
@@ -88,6 +89,9 @@ class LeagueSettings:
                     f"{name}={getattr(self, name)!r:.80} must be one or more, which must have different names: rename "
                     "the files, or leave one out"
                 )
+            for label in labels:
+                if re.fullmatch(r"(trackers|target)-\d+|response to .*", label):
+                    raise SettingsError(f"{label!r:.80} is how a member that is trained is called: rename the file")
         for each in (*self.teams, *self.targets, str(self.path)):
             if "," in each:
                 raise SettingsError(f"{each!r:.80} must be without commas, which stand between opponents: rename it")
@@ -233,11 +237,10 @@ class League:
 
     def _cell(self, team: Member, target: Member) -> Cell:
         """Return what a team scores against a target; a pair that was played before is read."""
-        name = f"{team.label}-{target.label}".replace(" ", "-").replace("/", "-")
-        path = self.settings.path / "cross-play" / f"{name}-{self.settings.episodes}.json"
+        path = self.settings.path / "cross-play" / team.label / f"{target.label}-{self.settings.episodes}.json"
         if not path.is_file():
             results = self._play(team, target, self.settings.episodes, TEST_SEED, "test")
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             write_json(path, {name: asdict(results.estimate(name)) for name in SCORES})
         return {name: Estimate(**score) for name, score in read_json(path).items()}
 
