@@ -14,9 +14,10 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
+from posse import family_names
 from posse_training.errors import ClusterError, SettingsError, require
 from posse_training.files import check_held
-from posse_training.options import Names, Ray
+from posse_training.options import Names, Ray, words_of
 from posse_training.parallel import all_on_ray, connected
 from posse_training.train.presets import Preset, default_settings
 from posse_training.train.settings import FREE, SETTINGS, TrainSettings, read_settings
@@ -119,9 +120,8 @@ def _what_next(path: Path) -> str:
         watched, teams, target = opponents[0], " ".join(opponents), f" --target {policy}"
     elif opponents:
         target = f" --target {opponents[-1]}"
-    return (
-        f"{path}\nnext:\n"
-        f"  posse watch {watched} --scenario {scenario}{target}\n"
-        f"  posse compare {teams} --scenario {scenario}{target}\n"
-        f"  posse replay {teams} --scenario {scenario}{target} --out {page}"
-    )
+    changed = f" --set {shlex.join(words_of(run.overrides))}" if run.overrides else ""
+    where = f"--scenario {scenario}{target}{changed}"
+    lines = [f"watch {watched} {where}", f"compare {teams} {where}", f"replay {teams} {where} --out {page}"]
+    shown = lines[1:2] if scenario in family_names() else lines  # watch and replay show one scenario
+    return "\n".join([f"{path}\nnext:", *(f"  posse {line}" for line in shown)])
