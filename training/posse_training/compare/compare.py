@@ -23,7 +23,7 @@ from posse import Batch, Family, Scenario, scenario_names
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, load_target
 from posse_baselines.fields import number
-from posse_training.compare.contenders import Contender, Plays, check_code, read_contenders
+from posse_training.compare.contenders import PLANNER, Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
@@ -43,8 +43,6 @@ from posse_training.parallel import apart
 from posse_training.provenance import commit
 from posse_training.replay import Replay, join, record, write_replay
 
-PLANNER: Final = "planner"
-"""The reference that is shown with every team."""
 SUMMARY: Final = "summary.json"
 REPORT: Final = "report.html"
 Key = tuple[str, str, int]

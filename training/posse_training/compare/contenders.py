@@ -18,6 +18,8 @@ from posse_training.evaluation.evaluation import played_errors
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
 
+PLANNER: Final = "planner"
+"""The reference that is shown with every team."""
 LOADING: Final = 60.0
 """Time that code may take until it is a policy, s, at most."""
 
@@ -44,7 +46,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
 
     Raises:
         PolicyError: No contender, a policy that cannot be loaded, a group without files, or a label that two
-            contenders share.
+            contenders share, or that is the planner's.
     """
     if not texts:
         raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
@@ -55,7 +57,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
         if sign and not (label and all(members.split(","))):
             raise PolicyError(f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,...")
         taken = {other.label for other in found}
-        if label in taken:
+        if label in taken or (sign and label == PLANNER):
             raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
         policies = tuple(name if is_code(name) else load(name) for name in names)
@@ -64,7 +66,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
                 check_code(name)
         if not sign and not isinstance(policies[0], str) and is_file(text):
             name = policies[0].name
-            label = name if name not in taken | stated else label
+            label = name if name not in taken | stated | {PLANNER} else label
         found.append(Contender(label, policies))
     return tuple(found)
 
