@@ -40,7 +40,7 @@ def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
     assert list(curve) == [0, 2560, 5120, 6400], "four candidates, four worlds, two trackers, 40 steps: 1,280"
     assert len(set(curve.values())) > 1
     for policy, score in (("ddcs-tuned", curve[0]), (load(best), max(curve.values()))):
-        played = evaluate(policy, settings.scenarios[0], 3, 0, split="validation", progress=False)
+        played = evaluate(policy, settings.given[0], 3, 0, split="validation", progress=False)
         assert played["safe_score"].mean() == pytest.approx(score, abs=1e-12)
 
 

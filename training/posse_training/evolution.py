@@ -83,7 +83,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     cma = SepCMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
     each = s.population * _steps_of(s)  # of a generation
-    generations = -(-s.steps // each)
+    generations = max(len(scores), -(-s.steps // each))
     display.begin(len(scores) * each, generations * each)
     if not curve:
         evaluate(0)
@@ -110,10 +110,7 @@ def check_adviser(settings: TrainSettings) -> None:
 class Candidates(LearnedPolicy):
     """C policies or corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
 
-    Args:
-        settings: Of the run.
-        weights: (C, MOTION, inputs).
-        card: Of the first candidate, which a file of this policy holds.
+    Their weights are (C, MOTION, inputs); a file of this policy holds the first one, with the card.
     """
 
     def __init__(self, settings: TrainSettings, weights: FloatArray, card: dict[str, Any]) -> None:

@@ -36,7 +36,7 @@ def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
     settings = target_run(tmp_path, team="ddcs-distributed", evaluate_worlds=4)
     smart = load_target("smart")
     denied = validate(settings, smart)
-    scenario = settings.scenarios[0]
+    scenario = settings.given[0]
     played = evaluate("ddcs-distributed", scenario, 4, 0, split="validation", progress=False)
     assert denied["score"] == denied["safe_score"] == pytest.approx(1 - played["score"].mean())
 

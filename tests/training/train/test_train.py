@@ -32,7 +32,7 @@ def test_a_training_exports_what_it_played(tmp_path: Path) -> None:
     policy = load(file)
     assert isinstance(policy, LearnedPolicy)
     assert policy.safeguard
-    scenario = small(tmp_path, **GUARDED).scenarios[0]
+    scenario = small(tmp_path, **GUARDED).given[0]
     results = evaluate(policy, scenario, 3, 0, split="validation", progress=False)
     for name in ("safe_score", "score", "contact_free"):
         assert results[name].mean() == pytest.approx(policy.card[f"validation_{name}"], abs=1e-12)

@@ -149,22 +149,14 @@ EVOLUTION: Final = "cmaes"
 
 
 def algorithm_of(name: str) -> Algorithm:
-    """Return an algorithm by name.
-
-    Raises:
-        SettingsError: It is unknown.
-    """
+    """Return an algorithm by name, or raise SettingsError."""
     if name not in ALGORITHMS:
         raise SettingsError(f"unknown algorithm {name!r:.80}; algorithms are: {', '.join([*ALGORITHMS, EVOLUTION])}")
     return ALGORITHMS[name]
 
 
 def check_algorithm(settings: TrainSettings) -> None:
-    """Raise if the algorithm is unknown, or cannot learn with these settings.
-
-    Raises:
-        SettingsError: The message names the setting.
-    """
+    """Raise SettingsError if the algorithm is unknown, or cannot learn with these settings."""
     name = settings.algorithm
     kind = None if name == EVOLUTION else algorithm_of(name)
     if settings.side == "target" and (kind is None or kind.reads_state):

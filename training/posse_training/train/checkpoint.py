@@ -57,11 +57,7 @@ def write_checkpoint(folder: Path, state: State) -> None:
 
 
 def read_checkpoint(folder: Path) -> State:
-    """Return the state of a folder's checkpoint.
-
-    Raises:
-        RunFolderError: There is none, or it is damaged.
-    """
+    """Return the state of a folder's checkpoint, or raise RunFolderError."""
     path = folder / CHECKPOINT
     if not path.is_file():
         raise RunFolderError(f"{folder} has no {CHECKPOINT}, which every run but one of cmaes keeps: name another")
@@ -76,13 +72,9 @@ def read_checkpoint(folder: Path) -> State:
 
 
 def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, log_deviation: float) -> None:
-    """Take networks and input statistics from a run's checkpoint; optimisers start anew.
+    """Give a model the networks of another run's checkpoint, and its input statistics; optimisers start anew.
 
-    Args:
-        folder: The other run's folder.
-        model: Takes the networks.
-        statistics: Takes the input statistics.
-        log_deviation: Exploration starts anew with it.
+    So does exploration, with ``log_deviation``.
 
     Raises:
         RunFolderError: There is no checkpoint, it is damaged, or of other networks or inputs.

@@ -19,10 +19,6 @@ from posse_training.train.settings import Point, TrainSettings
 class Display:
     """Shows the steps made, time left, and scores on the validation worlds.
 
-    Args:
-        settings: Of the run.
-        console: Where to show it.
-
     Attributes:
         bar: To be entered while the run goes on.
         beside: Safe score of ``settings.beside`` on the same worlds, if known.

@@ -16,9 +16,10 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.nn.functional import mse_loss
 
-import posse
-from posse import Scenario
+from posse import Batch
 from posse.numeric import FloatArray
+from posse.scenarios.family import shares
+from posse_baselines import batch_for
 from posse_baselines.learned import Encoding
 from posse_baselines.policy import Policy, begin
 from posse_training.train.algorithms import ALGORITHMS
@@ -26,6 +27,7 @@ from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import SlotGroup
 from posse_training.train.world_state import StateWriter
+from posse_training.train.worlds import pairings
 
 WORLDS: Final = 64
 """Worlds played in a round, over all scenarios."""
@@ -49,15 +51,10 @@ def imitate(
     statistics: RunningStatistics,
     report: Callable[[str], object],
 ) -> None:
-    """Make a PPO model's policy a copy of the expert.
+    """Make a PPO model's policy a copy of the expert, against the targets of the training.
 
-    Args:
-        model: A stable-baselines3 model; its networks and normaliser are changed, its optimiser is not.
-        settings: Of the training.
-        encoding: Which inputs the model reads from an observation.
-        expert: The policy to copy.
-        statistics: Input statistics; those of the first round are added.
-        report: Called after each round with a line that says how far it is, and the mean squared error.
+    The model's networks and normaliser are changed, its optimiser is not; the first round is added to the input
+    statistics. ``report`` is called after each round with a line that says how far it is, and the mean squared error.
     """
     policy: Any = model.policy
     generator = np.random.default_rng(settings.seed)
@@ -77,15 +74,21 @@ def imitate(
                 total += error.item() * len(chosen)
         return total / rows
 
-    worlds = max(1, WORLDS // len(settings.scenarios))
+    drawn, pairs = settings.family_scenarios, pairings(settings)
+    parts = [(shares(pair.scenario, drawn, drawn, settings.seed, "train"), pair.opponent) for pair in pairs]
+    plays = [(scenario, target) for part, target in parts for scenario, _ in part]
+    worlds, reads_state = max(1, WORLDS // len(plays)), ALGORITHMS[settings.algorithm].reads_state
     first_world = FIRST_WORLD
     rounds = settings.imitate_rounds
     every: list[Rows] = []
     for k in range(rounds):
         played: list[Rows] = []
-        for scenario in settings.scenarios:
+        for scenario, target in plays:
             by_expert = generator.random(worlds) < 1.0 - k / max(1, rounds - 1)
-            played.append(_play_round(policy, settings, encoding, expert, scenario, by_expert, first_world))
+            batch = batch_for(expert, scenario, worlds, target, seed=settings.seed, first_world=first_world)
+            state = StateWriter(batch, [one for one, _ in plays]) if reads_state else None
+            slots = SlotGroup(batch, encoding, state)
+            played.append(_play_round(policy, settings, slots, expert, batch, by_expert))
             first_world += worlds
         every += played
         if k == 0:
@@ -106,24 +109,14 @@ def _together(parts: list[Rows]) -> tuple[torch.Tensor, ...]:
 
 
 def _play_round(
-    policy: Any,
-    settings: TrainSettings,
-    encoding: Encoding,
-    expert: Policy,
-    scenario: Scenario,
-    by_expert: Any,
-    first_world: int,
+    policy: Any, settings: TrainSettings, slots: SlotGroup, expert: Policy, batch: Batch, by_expert: Any
 ) -> Rows:
     """Play one episode in each world; the expert acts where ``by_expert`` (E,) says so, the copy in the rest."""
-    parts, worlds, trackers = 2 + settings.message_size, len(by_expert), scenario.num_trackers
-    longest = max(settings.message_size, expert.message_size)
-    batch = posse.Batch(scenario.replace(message_size=longest), worlds, seed=settings.seed, first_world=first_world)
-    state = StateWriter(batch, settings.scenarios) if ALGORITHMS[settings.algorithm].reads_state else None
-    slots = SlotGroup(batch, encoding, state)
+    parts, trackers = 2 + settings.message_size, batch.scenario.num_trackers
     observations = batch.reset()
     memory = begin(expert, batch)
-    inputs, chosen, rewards = [], [], []
-    for _ in range(scenario.horizon):
+    inputs, chosen, rewards, goes_on = [], [], [], []
+    for _ in range(batch.scenario.horizon):
         x = slots.encode(observations)
         wanted, memory = expert.act(observations, memory)
         actions = wanted.copy()
@@ -132,16 +125,18 @@ def _play_round(
                 own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
             # The expert's messages are sent as well: its labels are those of a team of its own.
             said = actions[..., 2 : 2 + expert.message_size].copy()
-            actions[~by_expert, :, :parts] = np.clip(own.reshape(worlds, trackers, parts)[~by_expert], -1, 1)
+            actions[~by_expert, :, :parts] = np.clip(own.reshape(-1, trackers, parts)[~by_expert], -1, 1)
             actions[..., 2 : 2 + expert.message_size] = said
         observations, reward, terminated, truncated, _ = batch.step(actions)
         inputs.append(x)
         chosen.append(wanted[:, :, :parts].reshape(-1, parts))
         rewards.append(reward.reshape(-1))
+        touching = settings.end_on_contact & batch.arrays.tracker["touching"].any(axis=1)
+        goes_on.append(np.repeat(~touching, trackers))
         if (terminated | truncated).all():
             break
     returns = np.array(rewards, np.float32)  # (steps, rows), discounted
     for t in reversed(range(len(rewards) - 1)):
-        returns[t] += np.float32(settings.discount) * returns[t + 1]
+        returns[t] += np.float32(settings.discount) * returns[t + 1] * goes_on[t]
     returns[max(0, int(len(inputs) - _SETTLED / max(1e-3, 1 - settings.discount))) :] = np.nan
     return np.concatenate(inputs[::_EVERY]), np.concatenate(chosen[::_EVERY]), returns[::_EVERY].reshape(-1)

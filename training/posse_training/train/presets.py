@@ -31,7 +31,7 @@ def default_settings(
     """
     file = resources.files("posse_training.train") / "defaults.toml"
     defaults = tomllib.loads(file.read_text(encoding="utf-8"))
-    evolves = side == "trackers" and set(scenario.split(",")) <= set(defaults["evolved"])
+    evolves = side == "trackers" and {name.strip() for name in scenario.split(",")} <= set(defaults["evolved"])
     algorithm = algorithm or (EVOLUTION if preset == "residual" or evolves else "ppo")
     if preset == "residual" and algorithm != EVOLUTION:
         raise SettingsError(f"preset='residual' goes with cmaes, not {algorithm}: leave one of them out")

@@ -169,13 +169,6 @@ class TrainSettings:
             raise SettingsError(message)
 
     @property
-    def scenarios(self) -> tuple[Scenario, ...]:
-        """Every scenario and team size to train on, and the drawn scenarios of families."""
-        drawn = range(self.family_scenarios)
-        parts = ([g.draw(k, self.seed) for k in drawn] if isinstance(g, Family) else [g] for g in self.given)
-        return tuple(chain(*parts))
-
-    @property
     def given(self) -> tuple[Scenario | Family, ...]:
         """Every scenario or family and team size, with messages and reward weights set."""
         overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
@@ -270,10 +263,8 @@ def _conflicts(s: TrainSettings) -> Iterator[str]:
     for name, instead in _ELSEWHERE.items():
         if name in s.overrides and (name != "num_trackers" or s.team_sizes):
             yield f"overrides cannot set {name!r}: use {instead} instead"
-    parts = s.scenarios
-    if s.num_worlds < len(parts):
-        yield f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and team sizes"
-    if len({p.sonar_beams for p in parts}) > 1:
+    bases = [given.base if isinstance(given, Family) else given for given in s.given]
+    if len({base.sonar_beams for base in bases}) > 1:
         yield "scenarios that are trained on together need equal sonar_beams: set it in overrides"
 
 

@@ -17,7 +17,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
 from posse_training.evolution import check_adviser, evolve
-from posse_training.files import hold_settings, locked
+from posse_training.files import check_held, hold_settings, locked
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
@@ -25,10 +25,10 @@ from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings
+from posse_training.train.settings import BEST, CURVE, FREE, LAST, SETTINGS, TrainSettings, read_settings
 from posse_training.train.validation import LOAD, first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
-from posse_training.train.worlds import make_env, pairings
+from posse_training.train.worlds import divided, make_env
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
@@ -45,8 +45,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         num_threads: Threads that step the worlds; default: one per core. Never changes the result.
 
     Raises:
-        SettingsError: A package that is not installed.
-        PolicyError: An unknown policy, or one that cannot be an adviser.
+        SettingsError, PolicyError: What :func:`check_before` finds.
         RunFolderError: The folder is in use, holds a run of other settings, or a checkpoint that cannot be read.
         DivergedError: The networks give numbers that are not finite.
     """
@@ -54,7 +53,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
         stack.enter_context(locked(folder))
-        hold_settings(folder / SETTINGS, settings.to_dict(), FREE)
+        check_held(folder / SETTINGS, settings.to_dict(), FREE)
         # A run killed before its first checkpoint starts again, with the same result.
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
@@ -62,6 +61,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         display = Display(settings, console or Console())
         stack.enter_context(display.bar)
         if settings.algorithm == EVOLUTION:
+            hold_settings(folder / SETTINGS, settings.to_dict(), FREE)
             display.beside = score_beside(settings, display)
             return evolve(settings, folder, display, num_threads)
         env = make_env(settings, num_threads)
@@ -74,6 +74,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         else:
             run.restore(saved)
             display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
+        hold_settings(folder / SETTINGS, settings.to_dict(), FREE)  # now that it can begin
         display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
@@ -98,12 +99,16 @@ def check_before(settings: TrainSettings) -> None:
     check_algorithm(settings)
     if settings.algorithm == EVOLUTION:
         check_adviser(settings)
-    pairings(settings)
+    divided(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             LOAD[settings.side](policy)
     if settings.start is not None:
-        checkpoint.read_checkpoint(Path(settings.start))
+        checkpoint.read_checkpoint(start := Path(settings.start))
+        theirs = read_settings(start / SETTINGS)
+        for name in ("activation", "encoding", "safeguard"):
+            if (value := getattr(theirs, name)) != (own := getattr(settings, name)):
+                raise SettingsError(f"start={settings.start!r} has {name}={value!r}, not {own!r}: set that likewise")
 
 
 class Run(BaseCallback):
@@ -135,11 +140,7 @@ class Run(BaseCallback):
             imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.note)
 
     def restore(self, state: State) -> None:
-        """Go back to where a checkpoint was written.
-
-        Raises:
-            RunFolderError: The checkpoint does not fit the settings.
-        """
+        """Go back to where a checkpoint was written, or raise RunFolderError if it does not fit the settings."""
         try:
             self.env.restore(arrays_of(state["worlds"]))
             self.statistics.restore(state["statistics"])
@@ -167,7 +168,6 @@ class Run(BaseCallback):
         if steps >= min(self.at.next_evaluation, self.at.next_checkpoint):
             self.check_finite()
         if steps >= self.at.next_evaluation:
-            self.at.next_evaluation = (steps // s.evaluate_every + 1) * s.evaluate_every
             self._evaluate()
         if steps >= self.at.next_checkpoint:
             self.at.next_checkpoint = steps + s.checkpoint_every
@@ -199,7 +199,8 @@ class Run(BaseCallback):
 
     def _evaluate(self) -> None:
         """Evaluate on the validation worlds; keep the policy if it is the best so far."""
-        steps = self.model.num_timesteps
+        steps, every = self.model.num_timesteps, self.settings.evaluate_every
+        self.at.next_evaluation = (steps // every + 1) * every
         point = {"steps": float(steps), "seconds": time.monotonic() - self._started}
         point |= validate(self.settings, self._policy())
         best = max((earlier["safe_score"] for earlier in self.at.curve), default=-1.0)
@@ -234,11 +235,7 @@ class Run(BaseCallback):
         self.display.progress(self.model.num_timesteps, score)
 
     def check_finite(self, cause: Exception | None = None) -> None:
-        """Raise where the networks hold numbers that are not finite, before these are evaluated or saved.
-
-        Raises:
-            DivergedError: The message says what to do.
-        """
+        """Raise DivergedError where networks hold numbers that are not finite, before they are evaluated or saved."""
         if all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
             return
         raise DivergedError(

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse_baselines import PolicyError, Target, load, load_target
+from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import mean
@@ -29,8 +30,11 @@ def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> 
     Without them the first updates learn from inputs of very different sizes, and the run lags behind for millions of
     steps.
     """
-    few = max(_WARM_WORLDS, len(pairings(settings)))
-    warm = make_env(replace(settings, num_worlds=few if few >= len(settings.scenarios) else settings.num_worlds))
+    few = max(_WARM_WORLDS, sum(pair.share for pair in pairings(settings)))
+    try:
+        warm = make_env(replace(settings, num_worlds=few))
+    except SettingsError:  # drawn scenarios need more
+        warm = make_env(settings)
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
@@ -78,8 +82,8 @@ def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
     # Of the mean over pairings in each world: families of many pairings draw the same shares of their ranges.
     safe = mean(np.mean(played["safe_score"], axis=0), max(map(block_of, settings.given)))
     return {
-        "safe_score": float(safe.value),
-        "low": float(safe.low),
-        "high": float(safe.high),
+        "safe_score": safe.value,
+        "low": safe.low,
+        "high": safe.high,
         **{name: float(np.mean(played[name])) for name in ("score", "contact_free")},
     }

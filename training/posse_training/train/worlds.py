@@ -12,7 +12,7 @@ from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
 from posse_training.errors import SettingsError
-from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.algorithms import ALGORITHMS, EVOLUTION
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import TeamVecEnv
 
@@ -77,16 +77,20 @@ def divided(settings: TrainSettings) -> list[tuple[Pairing, range]]:
     """Return every pairing with its part of the worlds, by their shares.
 
     Raises:
-        SettingsError: Fewer worlds than scenarios and opponents.
+        SettingsError: Too few worlds for one in each share, or in each scenario that is drawn of a family.
     """
     pairs = pairings(settings)
     ends = np.cumsum([0, *(pair.share for pair in pairs)])
     edges = (settings.num_worlds * ends // ends[-1]).tolist()
-    if any(first == last for first, last in pairwise(edges)):
-        raise SettingsError(
-            f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
-        )
-    return [(pair, range(*edge)) for pair, edge in zip(pairs, pairwise(edges), strict=True)]
+    parts = [(pair, range(*edge)) for pair, edge in zip(pairs, pairwise(edges), strict=True)]
+    for pair, worlds in parts:
+        drawn = isinstance(pair.scenario, Family) and settings.algorithm != EVOLUTION
+        if len(worlds) < (least := settings.family_scenarios if drawn else 1):
+            raise SettingsError(
+                f"num_worlds={settings.num_worlds} leaves {len(worlds)} for a share of {pair.scenario.name}: it "
+                f"needs {least}; raise it" + ", or lower family_scenarios" * drawn
+            )
+    return parts
 
 
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
