@@ -55,11 +55,13 @@ INVALID = {
     "record idle random --episodes 1": "episodes=1 must be at least 2",
     "league --team": "teams=() must be one or more",
     "league --team a/best.json b/best.json": "must have different names",
+    "league --team idle --target target-1.safetensors": "'target-1' is how a member that is trained is called",
     "submit pursuit --out new --name <script>": "name='<script>' must be at most 100 letters",
-    "verify nowhere": "No such file or directory: 'nowhere/standing.csv'",
+    "verify nowhere": "posse verify: [Errno 2] No such file or directory: 'nowhere/standing.csv'",
     "compare": "No policies given",
     "compare idle mine=": "'mine=' is not a group of policies",
     "compare idle idle=pursuit": "two policies have the label 'idle'",
+    "compare idle planner=pursuit": "two policies have the label 'planner'",
     "compare idle --scenario constant konstant": "unknown scenario 'konstant'",
     "compare idle --ray auto smart": "one address at most",
     "compare pursuit --target smrat": "unknown target 'smrat' (did you mean 'smart'",
@@ -69,6 +71,7 @@ INVALID = {
     "replay idle --set arna=6,4": "did you mean 'arena'",
     "replay idle --set arena": "'arena' sets nothing: write KEY=VALUE",
     "replay idle --set arena=6 arena=4": "'arena' is set twice",
+    "train --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice: give it once",
     "export pursuit --out x.onnx": "pursuit",
     "export evader --out x.pb": "x.pb",
     "tune ddcs-distribute": "did you mean 'ddcs-distributed'",
@@ -78,6 +81,7 @@ INVALID = {
     "train --steps 0": "steps=0 must lie in [1, 1000000000000]",
     "train --hidden 0": "hidden=(0,) is invalid: it must be whole numbers of at least 1",
     "train --num-worlds 1 --team-sizes 2 3": "num_worlds=1",
+    "train --scenario family-open --num-worlds 64 --target smart constant smart": "or lower family_scenarios",
     "train --set num_trackers=3 --team-sizes 2": "use the setting team_sizes",
     "train --log-deviation -1 --final-log-deviation 0": "final_log_deviation=0.0 must not exceed",
     "train --algorithm dqn": "unknown algorithm 'dqn'; algorithms are: ppo",
@@ -126,7 +130,8 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     watch, compare, replay = (shlex.split(line) for line in after.splitlines())
     assert (watch[1], compare[1], replay[1]) == ("watch", "compare", "replay")
     assert (folder / "best.safetensors") == Path(watch[2]) == Path(compare[3]) == Path(replay[3])
-    assert main([*replay[1:], "--seconds", "1", "--set", "num_trackers=2"]) == 0
+    assert compare[-3:] == ["--set", "horizon=40", "settle_time=1.0"]
+    assert main([*replay[1:], "--seconds", "1"]) == 0
     assert (folder / "replay.html").is_file()
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280
@@ -135,6 +140,6 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     assert main([*arguments.split(), "--discount", "0.9"]) == 2
     assert "holds a run with discount=0.99, not 0.9: choose another --out" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in folder.iterdir()} == kept
-    assert main([*arguments.split(), "--steps", "1600"]) == 0
+    assert main(arguments.replace("1_280", "1600").split()) == 0
     assert "resuming" in capsys.readouterr().out
     assert json.loads((folder / "settings.json").read_text())["steps"] == steps_saved(folder) == 1600
