@@ -24,12 +24,14 @@ import numpy as np
 import numpy.typing as npt
 import tyro
 
-from posse import Scenario, get_scenario
+from posse import Family, Scenario, get_scenario
+from posse.scenarios.family import blocks
 from posse_baselines import Target, load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import difference, mean
 from posse_training.leaderboard import SEED, WORLDS
 from posse_training.options import words_of
@@ -107,11 +109,12 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
     if not settings.name.startswith(LEARNED):
         raise SettingsError(f"name={settings.name!r} must begin with {' or '.join(LEARNED)}")
     _check_one_training(settings.runs, trained)
-    plays = [_play(policy, trained[0].scenarios, settings.worlds, CHOICE_SEED, SPLIT) for policy in policies]
-    tests = [_play(policy, trained[0].scenarios, settings.test_worlds, SEED, "test") for policy in policies]
+    plays = [_play(policy, trained[0].given, settings.worlds, CHOICE_SEED, SPLIT) for policy in policies]
+    tests = [_play(policy, trained[0].given, settings.test_worlds, SEED, "test") for policy in policies]
     # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
     learned = [policy.card["steps"] > 0 for policy in policies]
     scores = [play["safe_score"].mean() for play in plays]
+    block = max(map(block_of, trained[0].given))
     best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
     seeds = [
         {
@@ -119,8 +122,8 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "steps": policy.card.get("steps"),
             "commit": policy.card.get("commit"),
             "command": command_of(run),
-            **{name: asdict(mean(play[name])) for name in _JUDGED},
-            "test": {name: asdict(mean(test[name])) for name in _JUDGED},
+            **{name: asdict(mean(play[name], block)) for name in _JUDGED},
+            "test": {name: asdict(mean(test[name], block)) for name in _JUDGED},
         }
         for run, policy, play, test in zip(trained, policies, plays, tests, strict=True)
     ]
@@ -132,23 +135,28 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             "choice": {"split": SPLIT, "seed": CHOICE_SEED, "worlds": settings.worlds},
             **{f"validation_{name}": float(plays[best][name].mean()) for name in _JUDGED},
             "curve": _curve(settings.runs[best]),
-            "check": make_check(policies[best], trained[0].scenarios),
+            "check": make_check(policies[best], [_first(given) for given in trained[0].given]),
         }
     )
 
 
 def _play(
-    policy: LearnedPolicy, scenarios: Sequence[Scenario], worlds: int, seed: int, split: str
+    policy: LearnedPolicy, scenarios: Sequence[Scenario | Family], worlds: int, seed: int, split: str
 ) -> dict[str, npt.NDArray[np.float64]]:
-    """Return what a policy is judged by in each world of all scenarios."""
+    """Return what a policy is judged by in each world, its mean over all scenarios and families."""
     played = [evaluate(policy, scenario, worlds, seed, split=split) for scenario in scenarios]
-    return {name: np.concatenate([results[name] for results in played]) for name in _JUDGED}
+    return {name: np.mean([results[name] for results in played], axis=0) for name in _JUDGED}
+
+
+def _first(given: Scenario | Family) -> Scenario:
+    """Return the scenario, or the first one of a family that a check draws."""
+    return next(blocks(given, range(1), CHECK_SEED, SPLIT))[0]
 
 
 def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:
     if len(policies) != 1:
         raise SettingsError(f"a target ships from one run, these are {len(policies)}")
-    (policy,), scenario, (team, scripted, least) = policies, trained[0].scenarios[0], REFERENCE
+    (policy,), scenario, (team, scripted, least) = policies, _first(trained[0].given[0]), REFERENCE
     new = Target(settings.name, "agent", policy)
     played = {
         target.name: evaluate(team, scenario, settings.worlds, TARGET_SEED, target=target, progress=False)

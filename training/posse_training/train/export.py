@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,13 +22,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
     """Return a model as a policy that plays without torch.
 
     Its actions are the mode of the distribution, equal to the model's
-    ``predict(..., deterministic=True)`` to rounding.
-
-    Args:
-        model: Of the run; a :class:`Normaliser` stands before its networks.
-        settings: Of the run.
-        encoding: Which inputs the model reads from an observation.
-        card: The policy's card.
+    ``predict(..., deterministic=True)`` to rounding. A :class:`Normaliser` stands before its networks.
     """
     algorithm = ALGORITHMS[settings.algorithm]
     layers = [module for module in algorithm.actor(model.policy) if isinstance(module, nn.Linear)]
@@ -59,7 +52,6 @@ def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, floa
         "trained_splits": ["train"],
         "chosen_on": "validation",
         "message_size": settings.message_size,
-        "command": " ".join(["posse", *sys.argv[1:]]),
         "settings": settings.to_dict(),
         "seed": settings.seed,
         "steps": steps,
