@@ -81,7 +81,7 @@ def record_dataset(
     overrides["message_size"] = max(base.message_size, *(each.message_size for each in players))
     settings = get_scenario(scenario, **overrides)
     name = name or "-and-".join(each.name for each in players)
-    called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_.-]|^[.]', '-', name)}-v0"
+    called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_-]', '-', name)}-v0"
     folder = Path(out).resolve()  # Minari joins a relative one to itself
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")

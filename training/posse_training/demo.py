@@ -17,7 +17,6 @@ from posse_baselines import load
 from posse_training.errors import SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.evaluation.evaluation import progress_bar
-from posse_training.evaluation.statistics import mean
 from posse_training.film import film
 from posse_training.parallel import apart
 from posse_training.replay import record, write_replay
@@ -59,7 +58,7 @@ def demo(episodes: int = 50, seconds: float = 12.0, out: Path = Path("runs/demo"
         for kind, name in TEAMS.items():
             bar.update(task, description=f"{name} plays")
             worlds = episodes if kind != "planner" else max(2, episodes // _PLANNED)
-            held = mean(evaluate(name, SCENARIO, worlds, SEED, progress=False)["safe_score"])
+            held = evaluate(name, SCENARIO, worlds, SEED, progress=False).estimate("safe_score")
             percent, off = 100 * held.value, 50 * (held.high - held.low)
             lines.append(f"{kind:<8} {name:<14} held {percent:.0f} ± {off:.0f} % of its slots in {worlds} worlds")
             bar.advance(task)

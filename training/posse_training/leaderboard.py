@@ -111,14 +111,16 @@ def read_standings(path: str | Path) -> list[Standing]:
     """Read and check a table; it loads no policy.
 
     Raises:
-        SettingsError: The file or a column is missing, or a value is invalid; its line is named.
+        OSError: The file cannot be read.
+        SettingsError: A column is missing, or a value is invalid; its line is named.
     """
     rows: list[Standing] = []
+    content = Path(path).read_bytes()
     try:
-        for row in csv.DictReader(Path(path).read_text(encoding="utf-8").splitlines(), restval="", strict=True):
+        for row in csv.DictReader(content.decode().splitlines(), restval="", strict=True):
             values = {field.name: _KINDS[field.type](row[field.name]) for field in fields(Standing)}
             rows.append(Standing(**values))
-    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
+    except (ValueError, KeyError, TypeError, csv.Error) as error:
         raise SettingsError(f"{path}, line {len(rows) + 2}: {error}") from error
     return rows
 

@@ -200,7 +200,7 @@ class _Run:
         since = time.monotonic() - self.seconds
         if not s.only:
             self.console.print(f"looking which of {len(self.tunables)} settings have an effect")
-        space = Space(self.tunables, s.only or self._effective())
+        space = Space(self.tunables, list(dict.fromkeys(s.only)) or self._effective())
         if not space.names:
             raise SettingsError(f"no setting of {s.policy!r} has an effect on {s.scenario!r}")
         self.console.print(f"searching {len(space.names)} settings: {', '.join(space.names)}", markup=False)

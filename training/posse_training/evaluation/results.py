@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,10 @@ class Results:
         if metric not in self.columns:
             raise KeyError(f"unknown metric {metric!r}; metrics are: {', '.join(self.columns)}")
         return self.columns[metric]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names of the metrics."""
+        return iter(self.columns)
 
     def estimate(self, metric: str) -> Estimate:
         """Return the mean of a metric over the episodes that have it, with its 95 % interval.

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse import REWARD_TERMS, Field, Scenario, get_scenario, scenario_names
+from posse import Field, Scenario, get_scenario, scenario_names
+from posse.declarations import Declarations
 from posse_baselines import Policy, Target, Trajectory, batch_for, load, load_target, rollout
 from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
@@ -152,7 +153,9 @@ def _describe_world(
         "slots": scenario.slot_offsets,
         "obstacles": np.stack([arrays[f"obstacle_{name}"][0] for name in ("x", "y", "radius")], axis=-1).tolist(),
         "tasks": TASKS,
-        "terms": [_meaning(term) for term in REWARD_TERMS if dict(scenario.reward_weights).get(term.name)],
+        "terms": [
+            _meaning(t) for t in Declarations.of(scenario).reward_terms if dict(scenario.reward_weights).get(t.name)
+        ],
         "fields": [_field(field) for field in fields],
         "metrics": [_meaning(metric) for metric in posse.METRICS],
     }
