@@ -50,7 +50,8 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
 
 
 def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
-    data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
+    data = record_dataset("random", "constant", 5, out=tmp_path, name="a.1", terminate_on_contact=True, **SHORT)
+    assert data.spec.dataset_id == "posse/constant/a-1-v0", "as Minari lets it be called"
     assert [episode.id for episode in data] == list(range(5))
 
 

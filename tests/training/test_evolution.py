@@ -49,6 +49,7 @@ def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -
     with killed_at(evolution, "write_json", 3):
         train(small(tmp_path / "cut", "cmaes", **EVOLVED), console=quiet())
     resume(tmp_path / "cut")
+    resume(tmp_path / "cut", steps=1)
     mine, other = (load_file(tmp_path / name / "last.safetensors") for name in ("whole", "cut"))
     assert mine.keys() == other.keys()
     assert all(np.array_equal(mine[name], other[name]) for name in mine)

@@ -1,5 +1,6 @@
 """Families of scenarios: what is drawn, what is refused, and all that plays them."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import posse
 from posse import ScenarioError
+from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.evaluation.statistics import mean
 
@@ -118,23 +120,22 @@ def test_teams_of_many_sizes_stand_side_by_side() -> None:
 
 def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
     pytest.importorskip("stable_baselines3")
+    from scripts.ship import CHOICE_SEED, Settings, ship
+
     from posse_training.train.settings import TrainSettings
     from posse_training.train.train import train
     from posse_training.tune import TuneSettings, tune
 
-    small: dict[str, Any] = {
-        "num_worlds": 36,
-        "family_scenarios": 36,
-        "rollout": 8,
-        "minibatch": 32,
-        "evaluate_worlds": 4,
-    }
-    train(TrainSettings(scenario="family-open", steps=200, folder=tmp_path / "run", overrides=SHORT, **small))
-    found = evaluate(str(tmp_path / "run/best.safetensors"), "family-open", 4, progress=False, **SHORT)
-    assert found.episodes == 4
-    tuned: dict[str, Any] = {"generations": 1, "population": 4, "worlds": 2, "validation_worlds": 2, "only": ("gain",)}
-    path = tune(TuneSettings(policy="ddcs-distributed", scenario="family-open", out=tmp_path / "tuned", **tuned))
-    assert path.is_file()
+    few: dict[str, Any] = {"num_worlds": 36, "family_scenarios": 36, "rollout": 8, "minibatch": 32}
+    few |= {"evaluate_worlds": 20, "overrides": SHORT, "folder": tmp_path / "run"}
+    train(TrainSettings(scenario="family-open", steps=200, **few))
+    shipped = LearnedPolicy.from_file(ship(Settings((tmp_path / "run",), "learned-x", 20, 20, tmp_path)))
+    played = evaluate(shipped, "family-open", 20, CHOICE_SEED, split="validation", progress=False, **SHORT)
+    assert shipped.card["validation_score"] == played["score"].mean(), "in scenarios that it was not trained on"
+    assert shipped.card["training_seeds"][0]["score"] == asdict(played.estimate("score"))
+    tuned: dict[str, Any] = {"generations": 1, "population": 4, "worlds": 2, "validation_worlds": 2}
+    tuned |= {"only": ("gain", "gain"), "out": tmp_path / "tuned"}
+    assert tune(TuneSettings(policy="ddcs-distributed", scenario="family-open", **tuned)).is_file()
 
 
 def test_other_ranges_are_drawn_from_for_a_test() -> None:

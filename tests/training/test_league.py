@@ -25,14 +25,7 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         team_steps=320,
         episodes=3,
         overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
-        training={
-            "num_worlds": 16,
-            "rollout": 5,
-            "minibatch": 32,
-            "epochs": 1,
-            "evaluate_worlds": 2,
-            "imitate_rounds": 1,
-        },
+        training={"num_worlds": 16, "rollout": 5, "minibatch": 32, "epochs": 1, "evaluate_worlds": 2},
         folder=folder,
     )
     return replace(settings, **changes)
@@ -75,8 +68,8 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
 def test_other_settings_are_refused(tmp_path: Path) -> None:
     settings = tiny(tmp_path, generations=1, responses="none")
     play_league(settings, console=quiet())
-    with pytest.raises(RunFolderError, match=r"holds a run with seed=1, not 2"):
-        play_league(replace(settings, seed=2), console=quiet())
+    with pytest.raises(RunFolderError, match=r"holds a run with longer=1, not 2, seed=1, not 2"):
+        play_league(replace(settings, seed=2, longer=2), console=quiet())
     more = play_league(replace(settings, episodes=2), console=quiet())
     assert more.cells["idle", "smart"]["score"].count == 2, "what is no training may be changed"
     (tmp_path / "league.json").write_text("[")

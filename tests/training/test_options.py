@@ -17,10 +17,8 @@ def test_settings_are_read_and_written_alike() -> None:
     values = {"arena": (6, 4), "target_speed": 0.5, "horizon": 40, "terminate_on_contact": True}
     assert settings_of(words) == {**values, "target_motion": "smart"}
     assert words_of(settings_of(words)) == words
-    assert settings_of(["num_neighbours=none", "sensing_range=inf"]) == {
-        "num_neighbours": None,
-        "sensing_range": float("inf"),
-    }
+    wanted = {"num_neighbours": None, "sensing_range": float("inf")}
+    assert settings_of(["num_neighbours=none", "sensing_range=inf"]) == wanted
 
 
 @pytest.mark.parametrize(("words", "ray"), [("", False), ("--ray", True), ("--ray 10.0.0.1:6379", "10.0.0.1:6379")])

@@ -79,13 +79,14 @@ class _Circle(BasePolicy):
     message_size = 1
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        assert memory.scenario.target_motion == "smart", "as in the training"
         side = memory.views(observations)["target_bearing"][..., 1]
         actions = np.stack([np.full_like(side, 0.5), 0.8 * side, np.ones_like(side)], axis=-1)
         return actions.astype(np.float32), memory
 
 
 def test_imitation_copies(tmp_path: Path) -> None:
-    settings = small(tmp_path, imitate="circle", imitate_rounds=4, encoding="plain")
+    settings = small(tmp_path, imitate="circle", imitate_rounds=4, encoding="plain", target="smart")
     env = make_env(settings)
     model = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []

@@ -13,7 +13,7 @@ from posse_training.train.algorithms import ALGORITHMS
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-@pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
+@pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio", "family-open,family-arena"])
 def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
     for preset in ("nothing", "residual"):
         settings = default_settings(scenario, algorithm if preset == "nothing" else None, preset=preset)
@@ -25,7 +25,7 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
     ("scenario", "side", "algorithm"),
     [
         ("search", "trackers", "cmaes"),
-        ("search,field", "trackers", "cmaes"),
+        ("search, field", "trackers", "cmaes"),
         ("search,smart", "trackers", "ppo"),
         ("search", "target", "ppo"),
     ],

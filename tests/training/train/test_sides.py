@@ -10,10 +10,11 @@ from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
-from posse_training.errors import RunFolderError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.train import TrainSettings
+from posse_training.train.networks import RunningStatistics
 from posse_training.train.train import train
-from posse_training.train.validation import validate
+from posse_training.train.validation import first_statistics, validate
 from posse_training.train.worlds import make_env
 
 
@@ -43,19 +44,16 @@ def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
 
 def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
     train(target_run(tmp_path / "first", steps=160), console=quiet())
-    second = target_run(
-        tmp_path / "second",
-        steps=80,
-        start=str(tmp_path / "first"),
-        learning_rate=0.0,
-        final_learning_rate=0.0,
-        evaluate_every=10**6,
-    )
+    still = {"learning_rate": 0.0, "final_learning_rate": 0.0, "evaluate_every": 10**6}
+    second = target_run(tmp_path / "second", steps=80, start=str(tmp_path / "first"), **still)
     train(second, console=quiet())
     before, after = (numbers(tmp_path / name)["/last/layers.0.weight"] for name in ("first", "second"))
     assert before == after
     with pytest.raises(RunFolderError, match=r"(?s)do not fit this run.*hidden"):
         train(replace(second, folder=tmp_path / "third", hidden=(8,)), console=quiet())
+    assert not (tmp_path / "third/settings.json").exists()
+    with pytest.raises(SettingsError, match="has activation='tanh', not 'relu'"):
+        train(replace(second, folder=tmp_path / "third", activation="relu"), console=quiet())
 
 
 def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
@@ -65,3 +63,6 @@ def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
     assert [batch.first_world for batch in env.batches] == [0, 6]
     assert env.num_envs == 9, "one slot for each target"
     assert env.reset().shape == (9, env.encoding.size)
+    many = replace(settings, team=",".join(["idle"] * 39), num_worlds=39)
+    first_statistics(many, statistics := RunningStatistics(env.encoding.size))
+    assert statistics.count == 39 * (HORIZON + 1)
