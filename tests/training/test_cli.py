@@ -71,7 +71,7 @@ INVALID = {
     "replay idle --set arna=6,4": "did you mean 'arena'",
     "replay idle --set arena": "'arena' sets nothing: write KEY=VALUE",
     "replay idle --set arena=6 arena=4": "'arena' is set twice",
-    "train --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice: give it once",
+    "train --steps 0 --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice: give it once",
     "export pursuit --out x.onnx": "pursuit",
     "export evader --out x.pb": "x.pb",
     "tune ddcs-distribute": "did you mean 'ddcs-distributed'",
@@ -120,7 +120,7 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     folder = tmp_path / "run"
     arguments = (
         "train --scenario constant --steps 1_280 --num-worlds 4 --team-sizes 2 --hidden 8 8 "
-        "--rollout 40 --minibatch 80 --evaluate-worlds 2 --beside None --no-tensorboard "
+        "--rollout 40 --minibatch 80 --evaluate-worlds 2 --evaluate-every 1280 --beside None --no-tensorboard "
         f"--set horizon=40 settle_time=1.0 --out {folder}"
     )
     assert main(arguments.split()) == 0
