@@ -71,7 +71,7 @@ INVALID = {
     "replay idle --set arna=6,4": "did you mean 'arena'",
     "replay idle --set arena": "'arena' sets nothing: write KEY=VALUE",
     "replay idle --set arena=6 arena=4": "'arena' is set twice",
-    "train --steps 0 --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice: give it once",
+    "train --steps 0 --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice",
     "export pursuit --out x.onnx": "pursuit",
     "export evader --out x.pb": "x.pb",
     "tune ddcs-distribute": "did you mean 'ddcs-distributed'",

@@ -40,4 +40,4 @@ def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:
     found = read_settings(tmp_path / "run" / "settings.json")
     assert (found.scenario, found.opponents) == ("constant,accelerating", {"smart": 1, "constant": 1})
     assert found.reward_weights == {**default_settings().reward_weights, "slot": 0.2}
-    assert [scenario.arena for scenario in found.given] == [(30, 20), (30, 20)]
+    assert [given.to_dict()["arena"] for given in found.given] == [(30, 20), (30, 20)]

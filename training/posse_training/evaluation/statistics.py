@@ -21,7 +21,7 @@ RESAMPLES: Final = 2000
 LEVEL: Final = 0.95
 
 Values = npt.NDArray[np.float64]
-Statistic = Callable[[Values], Any]
+Statistic = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
     if block > 1 and blocks > 1:
         student = scipy.stats.t.ppf((1 - LEVEL) / 2, blocks - 1)
         tail = 100 * scipy.stats.norm.cdf(np.sqrt(blocks / (blocks - 1)) * student)
-    ends = np.percentile(drawn, (tail, 100 - tail))
+    low, high = np.percentile(drawn, (tail, 100 - tail))
     if len(parts) == 1:  # no mean of values leaves their range, however the seeds are spread
-        ends = ends.clip(np.nanmin(parts[0]), np.nanmax(parts[0]))
-    return Estimate(float(statistic(*parts)), *map(float, ends), parts[0].size)
+        low, high = np.clip((low, high), np.nanmin(parts[0]), np.nanmax(parts[0]))
+    return Estimate(float(statistic(*parts)), float(low), float(high), parts[0].size)

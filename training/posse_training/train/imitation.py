@@ -16,7 +16,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.nn.functional import mse_loss
 
-from posse import Batch
+from posse import Batch, Scenario
 from posse.numeric import FloatArray
 from posse.scenarios.family import shares
 from posse_baselines import batch_for
@@ -76,7 +76,7 @@ def imitate(
 
     drawn, pairs = settings.family_scenarios, pairings(settings)
     parts = [(shares(pair.scenario, drawn, drawn, settings.seed, "train"), pair.opponent) for pair in pairs]
-    plays = [(scenario, target) for part, target in parts for scenario, _ in part]
+    plays: list[tuple[Scenario, Any]] = [(scenario, target) for part, target in parts for scenario, _ in part]
     worlds, reads_state = max(1, WORLDS // len(plays)), ALGORITHMS[settings.algorithm].reads_state
     first_world = FIRST_WORLD
     rounds = settings.imitate_rounds
