@@ -8,17 +8,7 @@ from tests.support.adapters import out_of_band
 from tests.support.learned import policy_for
 
 import posse
-from posse_baselines import (
-    BasePolicy,
-    Policy,
-    PolicyError,
-    begin,
-    load,
-    policy_names,
-    rollout,
-    split_agents,
-    stack_agents,
-)
+from posse_baselines import BasePolicy, Policy, PolicyError, begin, load, policy_names, rollout, stack_agents
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
 
@@ -199,20 +189,6 @@ def test_observations_of_another_shape_are_refused(name: str) -> None:
     memory = begin(policy, batch)
     with pytest.raises(PolicyError, match=r"shape \(2, 5, .*wanted \(3, 5, "):
         policy.act(batch.reset()[:2], memory)
-
-
-def test_a_parallel_environment_is_played_as_a_batch_of_one() -> None:
-    policy = load("ddcs-distributed")
-    batch = batch_for(policy, "constant", 1)
-    rows = batch.reset()[0]
-    agents = ["tracker_3", "target_0", "tracker_0", "tracker_1", "tracker_4", "tracker_2"]
-    observations = {name: rows[int(name[-1])] for name in agents if name.startswith("tracker")} | {"target_0": rows[0]}
-    stacked = stack_agents(observations)
-    np.testing.assert_array_equal(stacked[0], rows)
-    actions, _ = policy.act(stacked, policy.begin(batch.layout, 1))
-    split = split_agents(actions, agents)
-    assert set(split) == set(agents) - {"target_0"}
-    np.testing.assert_array_equal(split["tracker_3"], actions[0, 3])
 
 
 def test_a_team_with_a_gap_is_refused() -> None:

@@ -101,10 +101,6 @@ def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
     return play(posse.batch(name, worlds, **{**make, **team}), steps)
 
 
-def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
-    assert same(in_another_process(tmp_path, "field", 60), here("field", 60))
-
-
 LONG = (("accelerating", 30), ("constant", 3), ("search", 3), ("radio", 1), ("duel", 1))
 
 

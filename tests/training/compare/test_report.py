@@ -106,18 +106,6 @@ def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     assert set(bound) == {1.0}
 
 
-def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
-    """Teams that never recover count, and no team counts after the end of its episode."""
-    taken = [1.0, 2.0, np.nan, np.nan]
-    figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)], LOOKS)
-    x, y = line(figure, "pursuit")
-    at = dict(zip(np.round(x, 6), y, strict=True))
-    assert (at[0.9], at[1.0], at[1.9], at[2.0]) == (0, 0.25, 0.25, 0.5)
-    scenario = posse.get_scenario("leader-loss")
-    assert max(x) == pytest.approx(0.4 * scenario.duration - scenario.settle_time)
-    assert max(y) == 0.5
-
-
 def learned(curve: object) -> Contender:
     card = {
         "name": "mine",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.support.browser import chromium, opened, until
-from tests.support.replays import ATTACK, hostile, short
+from tests.support.replays import short
 
 from posse.rendering.style import GROUND, TARGET
 from posse_training.replay import read_replay, record, write_replay
@@ -232,52 +232,6 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
         page.evaluate("location.hash = '#t=nonsense&r=99'")
         until(page, "window.replay.app.selected === null")
         assert state(page, "position") == 4
-
-
-def test_a_hostile_page_runs_nothing_and_shows_the_text(browser: Browser, tmp_path: Path) -> None:
-    path = write_replay(hostile(), tmp_path / "a.html")
-    with opened(browser, path, "#t=0.3&r=1") as page:
-        page.keyboard.press("?")
-        page.keyboard.press("Escape")
-        for summary in page.locator("summary").all():
-            summary.click()
-        page.wait_for_timeout(200)
-        assert page.evaluate("window.ran") is None
-        assert page.title().split() == f"{ATTACK} on {ATTACK}".split()
-        assert ATTACK in page.evaluate("document.getElementById('scenario').textContent")
-        assert ATTACK in page.evaluate("document.getElementById('facts').textContent")
-        assert page.evaluate("document.getElementById('panel').textContent").count(ATTACK) >= 4
-        assert page.locator("img").count() == 0
-
-
-@pytest.mark.parametrize("view", [2.0, 2 * np.pi])
-@pytest.mark.parametrize("reach", [5.0, np.inf])
-def test_the_sensing_area_holds_the_target_when_it_is_seen(
-    browser: Browser, tmp_path: Path, view: float, reach: float
-) -> None:
-    place: dict[str, Any] = {"arena": (26.0, 16.0), "num_obstacles": 12, "obstacle_gap": 0.8, "observations": False}
-    sight: dict[str, Any] = {"field_of_view": view, "sensing_range": reach}
-    replay = record(["ddcs-distributed"], "obstacles", seed=2, **place, **sight)
-    sees = replay.players[0].columns["tracker_sees"].astype(bool)
-    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=0") as page:
-        inside = page.evaluate("""() => {
-            const { app, sightOf } = window.replay;
-            const inside = (corners, x, y) => corners.filter(([ax, ay], k) => {
-                const [bx, by] = corners.at(k - 1);
-                return ay > y !== by > y && x < ((bx - ax) * (y - ay)) / (by - ay) + ax;
-            }).length % 2 === 1;
-            const [player] = app.players;
-            const at = (name, frame, k) => player.columns.get(name).at(frame, k);
-            return Array.from({ length: player.frames }, (_, frame) =>
-                Array.from({ length: app.world.settings.num_trackers }, (_, i) => inside(
-                    sightOf(app.world.settings, app.world.obstacles, at("tracker_x", frame, i),
-                        at("tracker_y", frame, i), at("tracker_heading", frame, i)),
-                    at("target_x", frame, 0), at("target_y", frame, 0))));
-        }""")
-    wrong = np.array(inside) != sees
-    assert 0.05 < sees.mean() < 0.98
-    # Only where rounding to a millimetre decides.
-    assert wrong.mean() < 0.004
 
 
 def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:
