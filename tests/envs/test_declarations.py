@@ -48,7 +48,7 @@ MISTAKES: Final = {
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did you mean",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"line 4: .*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"line 4: it creates an array, a list or a text",
-    TERM.format("c, w, t", "return complex(t.x, t.y)"): r"line 2: it returns complex64, not a number",
+    TERM.format("c, w, t", "return complex(t.x, t.y)"): r"line 1: it returns complex64, not a number",
     FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"line 1: it returns Lanes, not 2 numbers",
     FIELD.format('"1", 0, 1', "c, v", "np.linalg.eigvals(v.x)"): r"line 4: eigvals\(Lanes\): no such function",
 }  # fmt: skip

@@ -30,7 +30,6 @@ from torchrl.envs import EnvBase  # noqa: E402
 
 import posse  # noqa: E402
 from posse.adapters.actions import MOTIONS, agent_names, as_motions, single_action_space  # noqa: E402
-from posse.engine.arguments import check_count  # noqa: E402
 from posse.signals.layout import StateLayout  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.safeguard import Guard  # noqa: E402
@@ -138,7 +137,7 @@ class PosseEnv(EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""
-        self._seed = None if seed is None else check_count("seed", seed, 0)
+        self._seed = seed
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
