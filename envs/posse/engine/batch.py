@@ -334,6 +334,7 @@ class Batch(OwnArrays):
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
             ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is
                 changed.
+            ScenarioError: The scenario is too tight for the start of a next episode to be drawn; only a reset helps.
         """
         self.check_running()
         actions, results = self.actions_of(actions), self._new_results()
