@@ -40,6 +40,7 @@ SHORTER = {
     r"--seconds \d+": "--seconds 1",
     r"episodes=[\d_]+": "episodes=2",
     r"(evaluate\((?!.*episodes=).*)\)": r"\1, episodes=2)",
+    r" (--[a-z-]+)(?: (?!--)\S+)*(?= .*\1 )": "",  # instead of the page's own
     r"(?<!training )num_worlds=[\d_]+": "num_worlds=2",
     r"learn\([\d_]+\)": "learn(64)",
     r"n_steps=\d+, batch_size=\d+": "n_steps=8, batch_size=80",

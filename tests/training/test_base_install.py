@@ -69,7 +69,6 @@ def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> 
         ("export", "export evader --out here.onnx"),
         ("video", "watch idle --out film.mp4"),
         ("cluster", "compare idle --episodes 2 --ray"),
-        ("cluster", "train --steps 1000 --seed 1 2 --ray"),
     ],
 )
 def test_commands_say_what_to_install(tmp_path: Path, extra: str, words: str) -> None:
