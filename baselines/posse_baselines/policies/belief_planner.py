@@ -66,7 +66,7 @@ def believed(scenario: Scenario) -> Scenario:
     """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
     near, far = scenario.start_distance
     return scenario.replace(
-        start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # never plays, always drawn
+        start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # no start is played
         sensor="range-bearing",
         sonar_beams=0,
         num_neighbours=0,
@@ -211,7 +211,7 @@ class Beliefs(OwnArrays):
         place, theta, frame, velocity = told.fix.T.astype(np.complex128)
         gap = (w["step"] - seen["step"]) * self.dt
         first = gap > _LOST_AFTER
-        if self.noisy:  # but one that is off by a turn that was not foreseen
+        if self.noisy:
             foreseen = w["x"] + 1j * w["y"]
             off = place - foreseen
             place = foreseen + np.where(first | (np.abs(off) > _FAR_OFF), 1.0, _FIX_TRUST) * off
