@@ -143,9 +143,10 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
 def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
     """Return the wanted velocity (m/s), turned past what stands in its way."""
     ahead, clearance = unit(wanted), team.settings.detour
-    left, right = turn_past(discs, clearance, ahead, 1.0), turn_past(discs, clearance, ahead, -1.0)
-    if left == 0.0 and right == 0.0:
+    left = turn_past(discs, clearance, ahead, 1.0)
+    if left == 0.0:  # nothing stands in the way
         return wanted
+    right = turn_past(discs, clearance, ahead, -1.0)
     kept = me.side if since(team, me, me.side_step) <= _SIDE_KEPT else 0
     goes_left = abs(left) < abs(right)
     if kept != 0 and abs(left if kept > 0 else right) <= MOST_TURN:

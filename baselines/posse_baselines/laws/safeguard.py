@@ -95,9 +95,9 @@ def put_walls(discs: Records, count: int, arena: Record, position: complex, radi
 @compiled
 def moved(disc: Record, time: float) -> complex:
     """Return by what a disc moves in a time (s), m: along an arc, if its velocity turns."""
-    half = 0.5 * disc.turn * time
-    if abs(half) < 1e-3:
+    if disc.turn == 0.0:
         return scaled(disc.velocity, time)
+    half = 0.5 * disc.turn * time
     return scaled(disc.velocity * vector(1.0, half), time * math.sin(half) / half)
 
 
