@@ -35,7 +35,7 @@ def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: i
 
 
 def test_a_split_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="splits are: train, validation, test"):
+    with pytest.raises(ScenarioError, match=r"unknown split 'training'.*known: train, validation, test"):
         OPEN.draw(0, 0, "training")
 
 

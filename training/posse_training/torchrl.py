@@ -150,10 +150,11 @@ class PosseEnv(EnvBase):
         marks = None if tensordict is None else tensordict.get("_reset", None)
         if marks is not None:
             mask = marks.reshape(self.batch.num_worlds).cpu().numpy()
-        if not mask.all():
+        whole = bool(mask.all())
+        if not whole:
             seed, options = kwargs.get("seed"), {**(options or {}), "reset_mask": mask}
         observations = self.batch.reset(seed=seed, options=options)
-        if mask.all():
+        if whole:
             self._seed = None
         if self._guard is not None:
             self._guard.restart(mask)
@@ -170,10 +171,9 @@ class PosseEnv(EnvBase):
         by_group = [tensordict.get((group, "action")) for group in self._rows]
         together = by_group[0] if len(by_group) == 1 else torch.cat(by_group, dim=1)
         given, shape = together.detach().cpu().numpy(), self.batch.action_shape
-        actions = self.batch.actions_of(
-            as_motions("the array of actions", given, shape[:2] if self._discrete else shape, self._discrete)
-        )
+        actions = as_motions("the array of actions", given, shape[:2] if self._discrete else shape, self._discrete)
         if self._guard is not None:
+            actions = self.batch.actions_of(actions)  # before the safeguard remembers this step
             motions = self._guard.actions(self._seen, actions[:, self._rows[TRACKERS]])
             actions = np.concatenate([motions, actions[:, motions.shape[1] :]], axis=1)
         observations, rewards, *_ = self.batch.step(actions)

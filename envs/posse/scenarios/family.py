@@ -88,7 +88,7 @@ class Family:
             if not isinstance(value, int | np.integer) or value < 0:
                 fail(name, value, "it must be a whole number, at least 0")
         if split not in SPLITS:
-            fail("split", split, f"splits are: {', '.join(SPLITS)}")
+            raise ScenarioError(unknown("split", split, SPLITS))
         shares = np.random.default_rng([seed, *f"{split}".encode(), index]).random(len(self.ranges))
         values: dict[str, float] = {}
         for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):

@@ -11,11 +11,11 @@ import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.train import TrainSettings
+from posse_training.train import TrainSettings, default_settings
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.train import train
 from posse_training.train.validation import first_statistics, validate
-from posse_training.train.worlds import make_env
+from posse_training.train.worlds import divided, make_env
 
 
 def target_run(folder: Path, **changes: Any) -> TrainSettings:
@@ -66,3 +66,4 @@ def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
     many = replace(settings, team=",".join(["idle"] * 39), num_worlds=39)
     first_statistics(many, statistics := RunningStatistics(env.encoding.size))
     assert statistics.count == 39 * (HORIZON + 1)
+    assert divided(default_settings("family-open", preset="residual")), "evolution needs no world for each draw"
