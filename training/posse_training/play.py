@@ -121,7 +121,7 @@ def play(
     last: Replay | None = None
     window.paused = True
     try:
-        while not renderer.closed:
+        while renderer.window:
             batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
             recorder = Recorder(batch, RECORD)
             renderer.title = f"{who}, world {world}"
@@ -147,7 +147,7 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
     speed = 1.0
     scores: list[float] = []
     renderer.draw(batch, colours=colours)
-    while not (renderer.closed or recorder.over.all() or "n" in window.pressed):
+    while renderer.window and not (recorder.over.all() or "n" in window.pressed):
         speed, turn = steer(speed, window.held(*_ARROWS), scenario.control_step)
         actions = np.zeros(batch.action_shape, np.float32)
         actions[:, :n], memory = policy.act(np.ascontiguousarray(observations[:, :n]), memory)

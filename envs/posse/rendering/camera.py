@@ -38,29 +38,22 @@ class Camera:
         self._corner: Points = np.array(half_sides)
         self.centre: Points = np.zeros(2)
         self.scale = 1.0
-        self._level: int | None = None
+        self._level = 0
 
-    def follow(self, points: Points, time: float | None) -> None:
-        """Move towards a view that contains all points (K, 2) m.
-
-        ``time``: since the last call, s; ``None``: move at once.
-        """
+    def follow(self, points: Points, time: float) -> None:
+        """Move towards a view that contains all points (K, 2) m; ``time``: since the last call, s; inf: at once."""
         pixels = np.array(self.viewport[2:], np.float64)
         lowest, highest = points.min(axis=0), points.max(axis=0)
         middle = (lowest + highest) / 2
         least = _LEAST_SPAN / min(pixels)  # m per pixel
         needed = max(least, float(((highest - lowest + 2 * _MARGIN) / pixels).max()))
         level = math.ceil(math.log(needed / least, _LEVEL) - 1e-9)
-        # Zoom out at once when necessary; zoom in only by a full level.
-        if time is None or self._level is None or level > self._level or level < self._level - 1:
+        if math.isinf(time) or not 0 <= self._level - level <= 1:  # zoom out at once, and in only by more than a level
             self._level = level
         wanted = least * _LEVEL**self._level
         if np.isfinite(self._corner).all():  # nothing outside the arena
             slack = np.maximum(self._corner + _MARGIN - pixels * wanted / 2, 0)
             middle = np.clip(middle, -slack, slack)
-        if time is None:
-            self.centre, self.scale = middle, 1 / wanted
-            return
         self.centre = self.centre + (1 - math.exp(-time / _FOLLOW_TIME)) * (middle - self.centre)
         zoom = (1 - math.exp(-time / _ZOOM_TIME)) * math.log(wanted * self.scale)
         reach = np.abs(points - self.centre).max(axis=0) + _MARGIN / 2

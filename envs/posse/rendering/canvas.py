@@ -43,10 +43,6 @@ class Canvas:
         self._large = pygame.Surface((width * _OVERSAMPLED, height * _OVERSAMPLED), 0, 32)
         self._frame = pygame.Surface(size, 0, 32)
 
-    def clip(self, box: tuple[int, int, int, int] | None) -> None:
-        """Clip drawing to (left, top, width, height); ``None``: no clipping."""
-        self._large.set_clip(None if box is None else tuple(v * _OVERSAMPLED for v in box))
-
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
         """Fill a rectangle."""
         x0, y0, x1, y1 = (round(v * _OVERSAMPLED) for v in (left, top, left + width, top + height))
@@ -54,10 +50,9 @@ class Canvas:
 
     def disc(self, centre: Point, radius: float, colour: Colour, width: float | None = None) -> None:
         """Fill a disc, or draw a circle whose line, ``width`` px, lies inside ``radius``."""
-        x, y = self._places([centre])[0]
-        if max(abs(x), abs(y)) < _FARTHEST:
-            line = 0 if width is None else max(1, round(width * _OVERSAMPLED))
-            pygame.draw.circle(self._large, colour, (x, y), round(radius * _OVERSAMPLED), line)
+        (place,) = self._places([centre])
+        line = 0 if width is None else max(1, round(width * _OVERSAMPLED))
+        pygame.draw.circle(self._large, colour, place, round(radius * _OVERSAMPLED), line)
 
     def line(self, start: Point, end: Point, width: float, colour: Colour) -> None:
         """Draw a straight line."""

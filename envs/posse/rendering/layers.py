@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -35,6 +36,7 @@ class Drawing:
     canvas: Canvas
     point: float  # pixels per point
     title: str
+    colours: Sequence[style.Colour]  # of the trackers
 
     @property
     def radius(self) -> float:
@@ -147,7 +149,7 @@ def trackers(d: Drawing) -> None:
     places = d.camera.project(scene.position)
     for i in np.argsort(~scene.broken, kind="stable"):  # the broken ones below
         place, ahead = places[i], places[i] + scene.heading[i] * (1, -1) * (radius + 3.5 * point)
-        colour, rim = scene.colours[i], style.TRACKER_RIM
+        colour, rim = d.colours[i], style.TRACKER_RIM
         if scene.broken[i]:
             colour, rim = style.BROKEN, style.TRACKER
         elif not scene.sees[i]:
@@ -181,6 +183,7 @@ def flashes(d: Drawing) -> None:
 def header(d: Drawing) -> None:
     """Write the title on the left, time and score on the right."""
     middle, edge = HEADER * d.point / 2, _EDGE * d.point
+    d.canvas.box(0, 0, d.canvas.size[0], d.camera.viewport[1], style.PAPER)
     d.canvas.text(d.title, (edge, middle), _TITLE * d.point, style.INK)
     figures = f"{d.scene.time:.1f} s    score {d.scene.score:.2f}"
     d.canvas.text(figures, (d.canvas.size[0] - edge, middle), _TEXT * d.point, style.INK, anchor=1)
@@ -189,20 +192,16 @@ def header(d: Drawing) -> None:
 def footer(d: Drawing) -> None:
     """Draw the scale bar."""
     point, scale, middle = d.point, d.camera.scale, d.canvas.size[1] - FOOTER * d.point / 2
+    d.canvas.box(0, sum(d.camera.viewport[1::2]), *d.canvas.size, style.PAPER)
     length = max((v for v in _BAR_LENGTHS if v * scale <= _BAR_MOST * point), default=_BAR_LENGTHS[0])
     left, right = _EDGE * point, _EDGE * point + length * scale
-    for start, end in ((left, right), (left, left), (right, right)):
-        arm = 4 * point if start == end else 0
-        d.canvas.line((start, middle - arm), (end, middle + arm), 1.6 * point, style.INK)
+    d.canvas.line((left, middle), (right, middle), 3 * point, style.INK)
     d.canvas.text(f"{length:g} m", (right + 7 * point, middle), _SMALL * point, style.INK)
 
 
 def draw(d: Drawing) -> None:
-    """Draw a frame: all layers, the last one on top, and the text around them."""
+    """Draw a frame: all layers, the last one on top."""
     d.canvas.box(0, 0, *d.canvas.size, style.PAPER)
-    d.canvas.clip(d.camera.viewport)
-    for layer in (ground, sensing, grid, trails, frame, slots, obstacles, links, trackers, target, flashes):
+    world = ground, sensing, grid, trails, frame, slots, obstacles, links, trackers, target, flashes
+    for layer in (*world, header, footer):
         layer(d)
-    d.canvas.clip(None)
-    header(d)
-    footer(d)

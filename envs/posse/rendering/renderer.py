@@ -19,7 +19,7 @@ from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, Window
 from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
-from posse.rendering.style import DESIGN_SIZE, Colour
+from posse.rendering.style import DESIGN_SIZE, TRACKER, Colour
 from posse.scenarios import Scenario
 
 LEAST_SIZE: Final = 200  # px, of width and height
@@ -44,8 +44,7 @@ class Renderer:
     Attributes:
         title: May be set between frames.
         camera: The view of the last frame; its ``project`` gives the pixels of points.
-        window: The window of the mode "human"; ``None`` once closed.
-        closed: Whether :meth:`close` was called, or the user closed the window.
+        window: The window of the mode "human"; ``None`` once :meth:`close` was called, or the user closed it.
 
     Raises:
         ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.
@@ -66,7 +65,7 @@ class Renderer:
         if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
             raise ValueError(f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px")
         width, height = int(size[0]), int(size[1])
-        self.scenario, self.mode, self.title, self.closed = scenario, mode, title or scenario.name, False
+        self.scenario, self.mode, self.title = scenario, mode, title or scenario.name
         self._canvas = Canvas((width, height))
         self._point = scale * min(width, height) / DESIGN_SIZE
         above, below = round(HEADER * self._point), round(FOOTER * self._point)
@@ -76,14 +75,14 @@ class Renderer:
         if mode == "human":
             self.window = Window((width, height), f"posse: {scenario.name}", 1 / scenario.control_step, keys)
 
-    def follow(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> Scene:
+    def follow(self, batch: Batch, world: int = 0) -> Scene:
         """Do as :meth:`draw` without drawing: for trails and view of videos that skip steps."""
         if batch.scenario != self.scenario:
             raise ValueError(
                 f"a batch of {batch.scenario.name!r} does not fit a renderer of "
                 f"{self.scenario.name!r}: their scenarios must be equal in every setting"
             )
-        scene = Scene(batch, world, colours)
+        scene = Scene(batch, world)
         self.camera.follow(scene.action, self._history.note(scene))
         return scene
 
@@ -102,18 +101,19 @@ class Renderer:
             once the frame's time is over or, in a paused window, the user steps or goes on.
 
         Raises:
-            ValueError: The batch is of another scenario or has no such world, another number of
-                colours, or the renderer of the mode ``"rgb_array"`` was closed.
+            ValueError: The batch is of another scenario or has no such world, or another number of colours.
             ResetNeeded: The batch has not been reset.
         """
-        if self.closed:
-            if self.mode == "human":
-                return None
-            raise ValueError("this renderer was closed: make a new one")
-        scene = self.follow(batch, world, colours)
+        if self.mode == "human" and self.window is None:
+            return None
+        number = self.scenario.num_trackers
+        if colours is not None and len(colours) != number:
+            raise ValueError(f"{len(colours)} colours do not fit {number} trackers: give one for each")
+        scene = self.follow(batch, world)
         if self.window is not None and not self.window.begin():
             return None
-        draw(Drawing(scene, self._history, self.camera, self._canvas, self._point, self.title))
+        colours = colours or (TRACKER,) * number
+        draw(Drawing(scene, self._history, self.camera, self._canvas, self._point, self.title, colours))
         if self.window is None:
             return self._canvas.pixels()
         if not self.window.show(self._canvas.finish()):
@@ -122,7 +122,6 @@ class Renderer:
 
     def close(self) -> None:
         """Close the window, if there is one. May be called twice."""
-        self.closed = True
         if self.window is not None:
             self.window.close()
             self.window = None

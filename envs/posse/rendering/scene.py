@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import Final
 
 import numpy as np
 
 from posse.engine.batch import Batch
 from posse.rendering.camera import Points
-from posse.rendering.style import TRACKER, Colour
 from posse.rules.state import NEVER
 
 _LINK_SHOWN: Final = 3  # control steps after a message
@@ -24,20 +23,18 @@ class Scene:
     Arguments and errors are those of :meth:`posse.rendering.renderer.Renderer.draw`.
     """
 
-    def __init__(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> None:
+    def __init__(self, batch: Batch, world: int) -> None:
         if not 0 <= world < batch.num_worlds:
             raise ValueError(f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}")
         batch.check_started("draw")
         of = {name: array[world] for name, array in batch.state.items()}
         s, n = batch.scenario, batch.scenario.num_trackers
-        if colours is not None and len(colours) != n:
-            raise ValueError(f"{len(colours)} colours do not fit {n} trackers: give one for each")
 
         def points(*names: str) -> Points:
             return np.stack([of[name] for name in names], axis=-1).astype(np.float64)
 
         self.scenario = s
-        self.episode = tuple(int(of[f"world_{k}"]) for k in ("seed", "split", "index", "episode", "key"))
+        self.episode = int(of["world_key"])
         self.step = int(of["world_step"])
         self.time = self.step * s.control_step
         self.score = float(of["world_score_sum"]) / max(self.step, 1)  # mean over the steps so far
@@ -56,11 +53,8 @@ class Scene:
         since = self.step - of["tracker_sensor_dead_from"].astype(np.int64)
         self.senses = ~self.broken & ((since < 0) | (since >= s.outage_steps))  # (N,) its sensor works
         self.struck = of["tracker_onsets"] > 0  # (N,) a contact began in this step
-        self.colours = (TRACKER,) * n if colours is None else tuple(colours)
-        heard = np.zeros((n, n), np.bool_)  # just now; nobody where the radio is perfect
-        if of["heard_step"].size:
-            heard = of["heard_step"] > max(self.step - s.radio_delay - _LINK_SHOWN, -1)
-        self.links = heard | heard.T  # (N, N)
+        heard = of["heard_step"] > max(self.step - s.radio_delay - _LINK_SHOWN, -1)  # just now
+        self.links = heard | heard.T  # (N, N); (0, 0) where the radio is perfect
         self.obstacles = points("obstacle_x", "obstacle_y", "obstacle_radius")  # (M, 3)
 
     @property
@@ -78,15 +72,15 @@ class History:
     def __init__(self) -> None:
         self._scenes: list[Scene] = []
 
-    def note(self, scene: Scene) -> float | None:
-        """Record a state; return the time since the last one, s, or ``None`` in a new episode.
+    def note(self, scene: Scene) -> float:
+        """Record a state; return the time since the last one, s; inf: in a new episode.
 
         A state recorded twice counts once; an earlier one (a restored batch) clears the history.
         """
         last = self._scenes[-1] if self._scenes else None
         if last is None or scene.episode != last.episode or scene.step < last.step:
             self._scenes = [scene]
-            return None
+            return math.inf
         kept = [s for s in self._scenes if s.step < scene.step and scene.time - s.time <= _TRAIL_TIME]
         self._scenes = [*kept, scene]
         return scene.time - last.time

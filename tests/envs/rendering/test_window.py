@@ -36,7 +36,6 @@ def test_a_window_shows_the_frame_above_a_line_with_its_keys() -> None:
     np.testing.assert_array_equal(shown[:300], frame)
     assert (shown[300:] < 200).any()
     renderer.close()
-    assert renderer.closed
     assert not pygame.display.get_init()
     renderer.close()
 
@@ -90,7 +89,7 @@ def test_the_callers_keys_end_a_pause_and_are_returned() -> None:
     assert not window.pressed
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     renderer.draw(batch)
-    assert renderer.closed
+    assert renderer.window is None
 
 
 @pytest.mark.parametrize("driver", [None, "no such driver"])

@@ -95,11 +95,11 @@ def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int],
     Team(policies[0], scenario, world=world, **worlds).step()  # compiles what is needed before the window opens
     renderer, window = open_window(scenario, size, keys)
     try:
-        while not renderer.closed:
+        while renderer.window:
             team = Team(policies[shown], scenario, world=world, **worlds)
             renderer.title = f"{team.policy.name}, world {world}"
             renderer.draw(team.batch)
-            while not (team.over or renderer.closed or window.pressed & keys.keys()):  # type: ignore[redundant-expr]
+            while renderer.window and not (team.over or window.pressed & keys.keys()):
                 team.step()
                 window.paused |= team.over  # the last moment stays until a key is pressed
                 renderer.draw(team.batch, colours=team.colours)
