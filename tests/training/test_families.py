@@ -4,7 +4,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -82,40 +81,12 @@ def test_results_do_not_depend_on_how_worlds_are_cut(monkeypatch: pytest.MonkeyP
     assert whole.estimate("score") == mean(whole["score"], 10) != mean(whole["score"])
 
 
-@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
-def test_a_vector_environment_holds_worlds_of_all(autoreset: str) -> None:
-    env: Any = gym.make_vec("posse/Solo-v0", num_envs=20, scenario=OPEN, autoreset=autoreset)
-    observations, infos = env.reset(seed=1)
-    assert observations in env.observation_space
-    assert infos["score"].shape == (20,)
-    env.action_space.seed(0)
-    before, wrong = [batch.arrays.copy() for batch in env.batches], np.zeros((20, 2))
-    wrong[-1] = 2
-    with pytest.raises(ValueError, match="not a number in"):
-        env.step(wrong)
-    for batch, arrays in zip(env.batches, before, strict=True):
-        assert all(np.array_equal(*both) for both in zip(batch.arrays, arrays, strict=True))
-    for _ in range(OPEN.horizon):
-        observations, rewards, _, truncated, infos = env.step(env.action_space.sample())
-        assert rewards.shape == (20,)
-    assert truncated.all()
-    assert infos["final_obs" if autoreset == "same_step" else "score"].shape == (20,)
-    if autoreset == "disabled":
-        mask = np.arange(20) % 2 == 0
-        assert env.reset(options={"reset_mask": mask})[0].shape == observations.shape
-    env.close()
-
-
 def test_teams_of_many_sizes_stand_side_by_side() -> None:
     sizes = posse.family("smart", num_trackers=(3, 7), num_neighbours=2, **SHORT)
     batches = posse.batches(sizes, 64)
     assert sum(batch.num_worlds for batch in batches) == 64
     assert {batch.scenario.num_trackers for batch in batches} == {3, 4, 5, 6, 7}
     assert {batch.layout.size for batch in batches} == {batches[0].layout.size}
-    env = gym.make_vec("posse/Solo-v0", num_envs=8, scenario=sizes)
-    assert env.reset(seed=0)[0].shape == (8, batches[0].layout.size)
-    with pytest.raises(ScenarioError, match="observations of one length"):
-        gym.make_vec("posse/Team-v0", num_envs=8, scenario=sizes)
 
 
 def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
@@ -142,21 +113,3 @@ def test_other_ranges_are_drawn_from_for_a_test() -> None:
     outside, fixed = OPEN.replace(target_speed=(0.75, 0.9)), OPEN.replace(target_speed=0.5)
     assert all(0.75 <= outside.draw(k).target_speed <= 0.9 for k in range(20))
     assert (fixed.draw(3).target_speed, [name for name, _ in fixed.ranges]) == (0.5, ["tracker_turn_rate"])
-
-
-def test_worlds_side_by_side_start_from_poses_of_their_own_or_not_at_all() -> None:
-    family = posse.family("obstacles", arena=(18.0, 28.0), num_obstacles=(0, 0))
-    env: Any = gym.make_vec("posse/Team-v0", 4, scenario=family)
-    with pytest.raises(gym.error.ResetNeeded):
-        env.reset(options={"reset_mask": np.array([True, False, False, False])})
-    env.reset(seed=3)
-    poses = np.zeros((4, 5, 3))
-    poses[..., 0], poses[..., 1] = np.arange(5), np.arange(4)[:, None]
-    env.reset(options={"tracker_pose": poses, "target_pose": [-3.0, 0.0, 0.0]})
-    batches = env.unwrapped.batches
-    np.testing.assert_array_equal([batch.arrays.tracker["y"][0, 0] for batch in batches], np.arange(4))
-    poses[..., 0] += 0.5 * min(batch.scenario.arena for batch in batches) - 4.0  # in a wall of the smallest alone
-    with pytest.raises(ValueError, match="tracker_4 of world 0 would start in a wall"):
-        env.reset(seed=4, options={"tracker_pose": poses[0]})
-    assert [int(batch.worlds["episode"][0]) for batch in batches] == [1] * 4
-    assert {batch.seed for batch in batches} == {3}

@@ -33,9 +33,8 @@ def solo_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     whole = get_scenario(scenario)
     if whole.breaks > 0 and "breaks" not in overrides:
         raise ScenarioError(
-            f"scenario {whole.name!r} does not fit posse/Solo-v0: in it breaks={whole.breaks} "
-            "of the trackers break down, and a team of one would be left with none. Pass "
-            "breaks=0, or use posse/Team-v0"
+            f"{whole.name!r}, in which breaks={whole.breaks} of the trackers break, does not fit posse/Solo-v0: "
+            "pass breaks=0, or use posse/Team-v0"
         )
     return team_scenario(scenario, **overrides)
 
@@ -66,9 +65,6 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
-        self._shape = self.action_space.shape
-        # An action indexed by it has the shape of a batch's, (1, rows, 2 + m).
-        self._as_batch = (None, None) if isinstance(self._rows, int) else (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -89,15 +85,15 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
     def actions_of(self, action: Any) -> FloatArray:
         """Return an action as an array (1, rows, 2 + m) in [-1, 1]; ValueError as for :meth:`step`."""
-        motions = as_motions("action", action, self._shape, self._discrete)
-        return in_box(motions[self._as_batch], self.batch.clip_actions)
+        motions = as_motions("action", action, self.action_space.shape, self._discrete)
+        return in_box(motions.reshape(self.batch.action_shape), self.batch.clip_actions)
 
     def _info(self) -> dict[str, Any]:
         info, terms = self._common_info(), self._own.terms
         values = terms.copy() if terms.ndim == 2 else terms.tolist()
-        for key, k in self._rewards:
+        for key, k in self.batch._rewards:
             info[key] = values[k]
-        if self._breakable:
+        if self.scenario.breaks:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)
         return info

@@ -65,7 +65,9 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
         self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self.np_random = np.random.default_rng(settings.get("seed"))  # for wrappers; no world draws from it
+        self.np_random = np.random.default_rng(
+            settings.get("seed")
+        )  # for SuperSuit's frame_skip_v0; worlds draw otherwise
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -118,12 +120,12 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def _infos_of(self, agents: list[str]) -> _AgentInfos:
         """Return the infos of the last step or reset."""
-        common, rewards, infos = self._common_info(), self._rewards, {}
+        common, rewards, infos = self._common_info(), self.batch._rewards, {}
         for agent, own in zip(agents, self._own.terms.T.tolist()):  # noqa: B905  equal lengths, in the hot path
             infos[agent] = info = common.copy()
             for key, k in rewards:  # faster than dict.update(zip(...)), which creates tuples
                 info[key] = own[k]
-        if self._breakable:
+        if self.scenario.breaks:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks
         return infos

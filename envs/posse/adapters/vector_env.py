@@ -1,8 +1,8 @@
-"""Gymnasium vector environments: many worlds, stepped by one call; those of a family side by side."""
+"""Gymnasium vector environments: many worlds, stepped by one call."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,17 +11,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import as_motions
-from posse.adapters.base import BatchEnv, joined
+from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
-from posse.engine.arguments import check_count, in_box, mask_of, options_of
+from posse.engine.arguments import check_count, mask_of
 from posse.numeric import BoolArray, FloatArray
-from posse.scenarios import Family, Scenario
-from posse.scenarios.family import scenario_or_family, shares
+from posse.scenarios import Scenario
 
 _Info = dict[str, Any]
-
-DRAWN: Final = 16
-"""Drawn scenarios of a family that are played side by side, where there are as many worlds."""
 
 
 class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
@@ -34,8 +30,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     :class:`TeamEnv`.
 
     Args:
-        scenario: Name of a scenario, or a scenario; or a family or its name: each of :data:`DRAWN` drawn scenarios has
-            a share of the worlds, and the spaces hold the observations of all, which must have one length.
+        scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
         autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``: the
             next step starts a new one and ignores its action; ``"same_step"``: a new one starts at
@@ -44,24 +39,14 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         settings: As for :class:`TeamEnv`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        **BatchEnv.metadata,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata = BatchEnv.metadata | {"autoreset_mode": AutoresetMode.NEXT_STEP}  # type: ignore[misc]
     _fit = staticmethod(team_scenario)
 
     def __init__(
-        self,
-        scenario: str | Scenario | Family = "constant",
-        num_envs: int = 1,
-        *,
-        autoreset: str = "next_step",
-        **settings: Any,
+        self, scenario: str | Scenario = "constant", num_envs: int = 1, *, autoreset: str = "next_step", **settings: Any
     ) -> None:
         self.num_envs = check_count("num_envs", num_envs, 1)
-        seed, split = settings.get("seed") or 0, settings.get("split", "train")
-        parts = shares(scenario_or_family(scenario), self.num_envs, min(DRAWN, self.num_envs), seed, split)
-        super().__init__(parts, autoreset=autoreset, **settings)
+        super().__init__(scenario, self.num_envs, autoreset=autoreset, **settings)
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space, self.single_action_space = self._spaces()
@@ -72,26 +57,19 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
         observations = self._start(seed, options)
         super().reset(seed=None if seed is None else int(seed))
-        begun = mask_of(options_of(options), self.num_envs).copy()
-        shapes = [(*batch.observation_shape[:2], len(batch.term_names)) for batch in self.batches]
-        nothing = [(np.zeros(shape[0]), np.zeros(shape, np.float32)) for shape in shapes]
-        infos = self._own([batch._infos_of(*zeros) for batch, zeros in zip(self.batches, nothing, strict=True)])
+        begun = mask_of(options or {}, self.num_envs).copy()
+        terms = np.zeros((*self.batch.observation_shape[:2], len(self.batch.term_names)), np.float32)
+        infos = self._own(self.batch._infos_of(np.zeros(self.num_envs), terms))
         return observations[:, self._rows], _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, _Info]:
         """Advance every world by one control step; errors are those of :meth:`posse.Batch.step`."""
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
-        motions = motions.reshape(self.num_envs, *self.batch.action_shape[1:])
-        if len(self.batches) > 1:  # all is checked before any world advances
-            in_box(motions, self.batch.clip_actions)
-            for batch in self.batches:
-                batch.check_running()
-        found = [batch.step(part) for batch, part in zip(self.batches, self._split(motions), strict=True)]
-        self._show()
-        *arrays, each = zip(*found, strict=True)
-        observations, rewards, terminated, truncated = map(joined, arrays)
-        last = joined([infos.pop("final_obs") for infos in each]) if "final_obs" in each[0] else None
-        ended, infos, more = terminated | truncated, self._own(each), {}
+        found = self.batch.step(motions.reshape(self.batch.action_shape))
+        observations, rewards, terminated, truncated, infos = found
+        if self.render_mode == "human":
+            self._draw()
+        last, ended, infos, more = infos.pop("final_obs", None), terminated | truncated, self._own(infos), {}
         if last is not None and ended.any():
             final = np.full(self.num_envs, None, dtype=object)
             for e in np.flatnonzero(ended):
@@ -100,26 +78,22 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             more = _with_masks({"final_obs": final, "final_info": infos_then}, ended)
             infos = _zeroed(infos, ~ended)
             if "working" in infos:
-                infos["working"] = joined([batch.working for batch in self.batches])[:, self._rows]
+                infos["working"] = self.batch.working[:, self._rows]
         infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | more
         own = rewards.mean(axis=1, dtype=np.float64)
         return observations[:, self._rows], own, terminated, truncated, infos
 
-    def _own(self, parts: Any) -> _Info:
-        """Return the agents' part of the batches' infos, in the types of Gymnasium's own vector environments."""
-        if any("working" in infos for infos in parts):  # a batch whose trackers never break does not say so
-            parts = [{"working": batch.working, **infos} for batch, infos in zip(self.batches, parts, strict=True)]
+    def _own(self, infos: _Info) -> _Info:
+        """Return the agents' part of the batch's infos, in the types of Gymnasium's own vector environments."""
         found = {}
-        for name in parts[0]:
-            values = joined([infos[name] for infos in parts])
+        for name, values in infos.items():
             values = values[:, self._rows] if values.ndim == 2 else values
             found[name] = values.astype(np.float64) if values.ndim == 1 and values.dtype == np.float32 else values
         return found
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw every world, (H, W, 3) uint8 each; in the mode "human", world 0 in a window."""
-        worlds = [(k, e) for k, batch in enumerate(self.batches) for e in range(batch.num_worlds)]
-        drawn = [self._draw(*world) for world in worlds[: 1 if self.render_mode == "human" else None]]
+        drawn = [self._draw(world) for world in range(1 if self.render_mode == "human" else self.num_envs)]
         return tuple(frame for frame in drawn if frame is not None) or None
 
 

@@ -36,8 +36,8 @@ _FIXED: Final = {
 class Family:
     """Scenarios that are equal but for some settings, each drawn uniformly from its range.
 
-    Made by :func:`posse.family`; accepted wherever worlds of several scenarios can be played: ``posse.batches``,
-    ``gymnasium.make_vec``, and the commands and functions to train, tune, evaluate and compare.
+    Made by :func:`posse.family`; accepted wherever worlds of several scenarios can be played: ``posse.batches``, and
+    the commands and functions to train, tune, evaluate and compare.
 
     Attributes:
         name: Its name in results.

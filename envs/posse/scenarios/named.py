@@ -162,7 +162,7 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     elif scenario in tuple(SCENARIOS):  # also of what is not hashable
         found = Scenario(name=scenario, **SCENARIOS[scenario])
     else:
-        families = "; families, as those of posse.family_names(), are for gymnasium.make_vec and posse.batches"
+        families = "; families, as those of posse.family_names(), are for posse.batches"
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS) + families)
     if "horizon" in overrides and "settle_time" not in overrides:
         at_once = found.replace(settle_time=1e-9, **overrides)  # shorter than any episode

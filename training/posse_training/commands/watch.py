@@ -99,7 +99,7 @@ def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int],
             team = Team(policies[shown], scenario, world=world, **worlds)
             renderer.title = f"{team.policy.name}, world {world}"
             renderer.draw(team.batch)
-            while renderer.window and not (team.over or window.pressed & keys.keys()):
+            while renderer.window and not (team.over or window.pressed & keys.keys()):  # type: ignore[truthy-bool]
                 team.step()
                 window.paused |= team.over  # the last moment stays until a key is pressed
                 renderer.draw(team.batch, colours=team.colours)
