@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled, out_of_line
+from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer
 from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
@@ -128,7 +128,7 @@ def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: in
     return float(time)
 
 
-@out_of_line
+@compiled
 def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     """Set the own slot by the assignment of least total arrival time."""
     settings, n, cost = team.settings, len(team.slots), work.cost

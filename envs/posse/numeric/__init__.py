@@ -5,7 +5,7 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records, record_type
-from posse.numeric.compile import UNCOMPILED, compiled, kernel, out_of_line
+from posse.numeric.compile import UNCOMPILED, compiled, kernel
 from posse.numeric.lanes import WIDTH, Lanes, Mask, choose, eight, greater, lesser, root
 from posse.numeric.threads import MOST_THREADS, over_worlds
 
@@ -30,7 +30,6 @@ __all__ = [
     "greater",
     "kernel",
     "lesser",
-    "out_of_line",
     "over_worlds",
     "record_type",
     "root",

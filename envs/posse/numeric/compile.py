@@ -1,9 +1,8 @@
 """Compile functions to machine code, and keep kernels on disk.
 
-:func:`compiled` and :func:`out_of_line` are for functions of one robot or one world, :func:`kernel` for the few that
-Python calls. There is no fast-math, since a result must not depend on a world's place in its batch. With
-``NUMBA_DISABLE_JIT=1`` they return the plain function, for debugging. Two of numba's inner parts are overridden; the
-classes at the end say what each gains, and ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
+:func:`compiled` is for functions of one robot or one world, :func:`kernel` for the few that Python calls. There is no
+fast-math, since a result must not depend on a world's place in its batch. With ``NUMBA_DISABLE_JIT=1`` they return the
+plain function, for debugging.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import inspect
 import io
 import os
 import pickle
@@ -23,8 +23,7 @@ from typing import Any, Final, TypeVar, cast
 import llvmlite.binding as llvm
 import numba
 import numpy as np
-from numba.core import caching, codegen, compiler, serialize, types
-from numba.core.registry import CPUDispatcher
+from numba.core import caching, codegen, compiler, registry, serialize, types
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -39,16 +38,8 @@ _OPTIONS: Final[dict[str, Any]] = {"nopython": True, "nogil": True, "error_model
 
 
 def compiled(function: F) -> F:
-    """Compile a function that kernels and other compiled functions call.
-
-    It is inlined into its callers, since passing arrays takes longer than most functions.
-    """
-    return function if UNCOMPILED else cast("F", _Function(function, {"forceinline": True}))
-
-
-def out_of_line(function: F) -> F:
-    """Do as :func:`compiled` without inlining: long and rarely called functions would crowd the instruction cache."""
-    return function if UNCOMPILED else cast("F", _Function(function, {}))
+    """Compile a function that is inlined into kernels and other compiled functions, since passing arrays takes long."""
+    return function if UNCOMPILED else cast("F", _Function(function))
 
 
 def kernel(function: F) -> F:
@@ -59,27 +50,22 @@ def kernel(function: F) -> F:
     """
     if UNCOMPILED:
         return function
-    dispatcher: Any = CPUDispatcher(function, {}, _OPTIONS, _Compiler)
+    dispatcher: Any = registry.CPUDispatcher(function, {}, _OPTIONS, _Compiler)
     dispatcher._cache = _Cache(function)
     return cast("F", dispatcher)
 
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).digest()
-_VERSIONS: Final = sys.version, numba.__version__, llvm.llvm_version_info, np.__version__
 _PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
-_compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 
 
 def stamp(*values: Any) -> str:
-    """Return a hash of functions with all that they reach, and of other values, as they are now.
-
-    Functions of posse count by its sources and their closures; others by their code, defaults, closures, and the
-    globals and attributes of modules that they name, recursively.
-    """
+    """Return a hash of values as they are now; of a function with its code, defaults and what it names, recursively."""
     _known.clear()
-    return _digest((_SOURCES, _VERSIONS, _CONFIG.OPT, _CONFIG.BOUNDSCHECK, values)).hex()
+    versions = sys.version, numba.__version__, np.__version__, llvm.llvm_version_info, _CONFIG.OPT, _CONFIG.BOUNDSCHECK
+    return _digest((_SOURCES, versions, values)).hex()
 
 
 def _digest(value: Any) -> bytes:
@@ -90,10 +76,7 @@ def _digest(value: Any) -> bytes:
 
 
 class _Reached(pickle.Pickler):
-    """Writes functions with all that they reach, and classes by what compiled code sees of them.
-
-    What is written is hashed and never read, so that the ``repr`` of a reduced value is never called.
-    """
+    """Writes functions with all that they reach, and classes by what compiled code sees of them; it is never read."""
 
     def reducer_override(self, value: Any) -> Any:
         function = getattr(value, "py_func", value)
@@ -101,9 +84,9 @@ class _Reached(pickle.Pickler):
             if function not in _known:
                 _known[function] = b"itself"  # if it is recursive
                 _known[function] = _digest(_parts_of(function))
-            if type(value) is CPUDispatcher and _compiled_with.get(value) != _known[function]:
+            if type(value) is registry.CPUDispatcher and vars(value).get("reached") != _known[function]:  # a user's own
                 value.recompile()
-                _compiled_with[value] = _known[function]
+                vars(value)["reached"] = _known[function]
             return repr, (_known[function],)
         if isinstance(value, CodeType):  # without places in its file
             return repr, ((value.co_code, value.co_consts, value.co_names, value.co_varnames, value.co_freevars),)
@@ -111,30 +94,25 @@ class _Reached(pickle.Pickler):
             return repr, ((str(value), value.key),)
         if isinstance(value, (ModuleType, type)):
             return repr, ((value.__name__, getattr(value, "_fields", ()), repr(getattr(value, "__members__", ""))),)
-        try:
+        with contextlib.suppress(Exception):  # pickle may raise anything
             pickle.dumps(value)
-        except Exception:  # pickle may raise anything; such a value makes a kernel for this process alone
-            return repr, ((_PROCESS, id(value)),)
-        return NotImplemented
+            return NotImplemented
+        return repr, ((_PROCESS, id(value)),)  # for a kernel of this process alone
 
 
 def _parts_of(function: FunctionType) -> tuple[Any, ...]:
     """Return what a function says, and the values of the names in its code, in its scope and in modules found there."""
-    code, cells = function.__code__, function.__closure__ or ()
-    codes = [code]
-    for each in codes:  # those within are added as they are found
-        codes += (inner for inner in each.co_consts if isinstance(inner, CodeType))
-    names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
-    scope = dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
-    if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
+    code, scope = function.__code__, dict(inspect.getclosurevars(function).nonlocals)
+    if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):  # posse's globals are in its sources
         scope = {**function.__globals__, **scope}
-    found: list[Any] = []
-    places: list[Any] = [SimpleNamespace(**scope)]
-    for place in places:  # so are modules
-        values = [(name, vars(place)[name]) for name in sorted(names & vars(place).keys())]
-        modules = (value for _, value in values if isinstance(value, ModuleType) and value not in places)
-        places += (each for each in modules if each.__name__.partition(".")[0] not in ("numba", "numpy"))
-        found += values
+    codes = code, *(inner for inner in code.co_consts if isinstance(inner, CodeType))
+    names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
+    found: list[Any] = [(name, scope[name]) for name in sorted(names & scope.keys())]
+    modules: set[ModuleType] = {numba, np}  # looked through
+    for _, value in found:  # what is in modules is added as they are found
+        if isinstance(value, ModuleType) and value not in modules:
+            modules.add(value)
+            found += ((name, vars(value)[name]) for name in sorted(names & vars(value).keys()))
     return function.__module__, function.__qualname__, code, function.__defaults__, function.__kwdefaults__, found
 
 
@@ -170,20 +148,16 @@ class _Cache(caching.NullCache):
 
 @functools.cache  # once per process
 def _announce() -> None:
-    again = "if it does so at every start, set POSSE_CACHE_DIR to a folder that can be written to"
-    sys.stderr.write(f"posse: compiling kernels, which takes some seconds; {again}\n")
+    sys.stderr.write("posse: compiling kernels, some seconds; if each time, set POSSE_CACHE_DIR to a writable folder\n")
 
 
 class _Library(codegen.JITCodeLibrary):
-    """LLVM code of a kernel, in which no loop is unrolled or vectorised: most run a few times. Kernels gain 20 %.
-
-    Neighbouring scalars are vectorised (SLP) instead; that and ``noalias`` below gain 2 %.
-    """
+    """LLVM code of a kernel, in which no loop is unrolled or vectorised, since most run a few times: 20 % faster."""
 
     def _optimize_final_module(self) -> None:
         options = llvm.create_pipeline_tuning_options(_CONFIG.OPT)
         options.loop_unrolling = options.loop_vectorization = False
-        options.slp_vectorization = True
+        options.slp_vectorization = True  # of neighbouring scalars: 2 % faster
         builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)
 
@@ -192,9 +166,6 @@ class _InnerLibrary(codegen.JITCodeLibrary):
     """LLVM code of a function, which is optimised and made machine code only where it is linked; saves 12 s."""
 
     codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)  # numba's requires machine code
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         pass
@@ -208,21 +179,20 @@ class _Compiler(compiler.CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
-        inner = state.flags.no_cpython_wrapper
-        state.flags.noalias = not inner
-        library = _InnerLibrary if inner else _Library
+        library = _InnerLibrary if state.flags.no_cpython_wrapper else _Library
+        state.flags.noalias = library is _Library
         state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class _Function(CPUDispatcher):
+class _Function(registry.CPUDispatcher):
     """A function that Python can call, with a form to link into kernels for each state of what it reaches."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function, {}, _OPTIONS)
-        options = {**_OPTIONS, **options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self.inner = functools.cache(lambda state: CPUDispatcher(function, {}, options, _Compiler))
+        options = {**_OPTIONS, "forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self.inner = functools.cache(lambda state: registry.CPUDispatcher(function, {}, options, _Compiler))
 
     @property
     def _numba_type_(self) -> types.Dispatcher:

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, compiled, greater, lesser, out_of_line, root
+from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, compiled, greater, lesser, root
 from posse.numeric.lanes import bits, least, load
 from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
 from posse.rules.state import BIT, NO_BITS
@@ -127,7 +127,7 @@ def ones(mask: np.uint64) -> int:
     return count
 
 
-@out_of_line
+@compiled
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Find the contacts of tracker i with something near; return whether it touches the target."""
     bit, touch = BIT << np.uint64(i), c.robot_radius + c.robot_radius + TOUCHING_GAP

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from posse.numeric import HALF, ONE, WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, out_of_line
+from posse.numeric import HALF, ONE, WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled
 from posse.numeric.lanes import eight, greater, lesser, load, store, store_fields
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import FAR, blocks, columns, write_block
@@ -41,7 +41,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
     s.near_x[place], s.near_y[place] = robot.x, robot.y
 
 
-@out_of_line
+@compiled
 def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first.
 
@@ -162,7 +162,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     )
 
 
-@out_of_line
+@compiled
 def drift(c: Record, w: Record, odometry: Records) -> None:
     """Let each tracker's own pose, as it knows it, take a step of its random walk."""
     for i, o in enumerate(odometry):

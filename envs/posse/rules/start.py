@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled, out_of_line
+from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
 from posse.rules.discs import obstacle_within, surroundings_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
@@ -110,7 +110,7 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
         w.undrawn |= _TRACKERS
 
 
-@out_of_line
+@compiled
 def begin(c: Record, worlds: WorldArrays, e: int) -> None:
     """Reset world e to the start of an episode, but for poses, faults and sums of metrics."""
     w, trackers = worlds.world[e], worlds.tracker[e]
@@ -147,7 +147,7 @@ def begin(c: Record, worlds: WorldArrays, e: int) -> None:
         t.start_x, t.start_y = t.x, t.y
 
 
-@out_of_line
+@compiled
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)

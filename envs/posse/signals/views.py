@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled, out_of_line
+from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled
 from posse.numeric.lanes import bits, choose, counts, eight, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
@@ -313,7 +313,7 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: 
     return load_fields(worlds.heard[e, observers.i, j], MESSAGE)
 
 
-@out_of_line
+@compiled
 def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int, s: Record, rows: FloatArray) -> None:
     """Write the messages of the mates in a place: none in an empty one, and none to a target."""
     first, end, i, now = observers

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import ZERO, FloatArray, Record, Records, compiled, out_of_line
+from posse.numeric import ZERO, FloatArray, Record, Records, compiled
 from posse.rules.kinematics import turned
 from posse.rules.randomness import RADIO_LOSS, uniform
 from posse.rules.senses.sensing import take_fix
@@ -47,7 +47,7 @@ def keep_messages(c: Record, w: Record, trackers: Records, actions: FloatArray, 
             message[slot, i, k] = actions[i, 2 + k] if works else ZERO
 
 
-@out_of_line
+@compiled
 def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: Records) -> None:
     """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
     slot = w.step % (c.radio_delay + 1)
@@ -61,7 +61,7 @@ def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: 
             b.odometry = odometry[i]
 
 
-@out_of_line
+@compiled
 def hear(
     c: Record,
     w: Record,
@@ -104,7 +104,7 @@ def hear(
                 take_fix(c, t, b)
 
 
-@out_of_line
+@compiled
 def connected(c: Record, w: Record, trackers: Records) -> bool:
     """Return whether the radio graph of the working trackers is connected.
 

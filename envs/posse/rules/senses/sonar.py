@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled, out_of_line
+from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled
 from posse.numeric.lanes import bits, choose, eight, greater, lesser, load, lowest_bit, root, store
 from posse.rules.discs import FAR, blocks, num_discs, to_wall
 from posse.rules.kinematics import A_LITTLE_MORE, in_frame
@@ -37,7 +37,7 @@ def echo_of_disc(c: Record, ahead: np.float32, left: np.float32, radius: np.floa
         store(s.reading, k, reading)
 
 
-@out_of_line
+@compiled
 def echo_of_walls(c: Record, robot: Record, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
     for normal_x, normal_y in ((ONE, ZERO), (-ONE, ZERO), (ZERO, ONE), (ZERO, -ONE)):  # outward

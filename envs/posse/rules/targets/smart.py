@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from posse.declarations import Memory, target_motion
-from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compiled, out_of_line
+from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compiled
 from posse.numeric.lanes import choose, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
@@ -141,7 +141,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
                 w.goal_cos, w.goal_sin = ux, uy
 
 
-@out_of_line
+@compiled
 def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
@@ -160,7 +160,7 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     return np.float32(far / c.target_speed)
 
 
-@out_of_line
+@compiled
 def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Set the goal heading whose turn disrupts the formation most.
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled, out_of_line
+from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled
 from posse.rules.discs import surroundings_within, to_wall
 from posse.rules.kinematics import arc, turn_towards
 
@@ -35,7 +35,7 @@ def target_turn_rate(
     return turn
 
 
-@out_of_line
+@compiled
 def mirror_at_walls(c: Record, w: Record) -> None:
     """Mirror the goal heading at a wall that is near and ahead."""
     inner = max(c.half_width - _SOFT_WALL, c.half_width * HALF)
@@ -63,7 +63,7 @@ def free_circles(
     return left, not surroundings_within(c, obstacles, x + aside_x, y - aside_y, room)
 
 
-@out_of_line
+@compiled
 def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
     """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
 
@@ -88,7 +88,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
     return np.float32(side * c.target_turn_rate)
 
 
-@out_of_line
+@compiled
 def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
     """Return the side (+1 left, -1 right) to turn to if neither turning circle is free."""
     if w.speed == ZERO:
