@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from posse.engine.arguments import as_float32, check_choice, check_count, in_box
-from posse.engine.batch import Batch
+from posse.engine.batch import Batch, of_batch
 from posse.engine.kernels import LOOK, Orders, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, ScenarioError, get_scenario
@@ -159,26 +159,21 @@ def batch(
     scenario: str | Scenario = "constant",
     num_worlds: int = 1,
     *,
-    seed: int = 0,
-    split: str = "train",
-    first_world: int = 0,
-    autoreset: str = "next_step",
-    num_threads: int | None = None,
-    clip_actions: bool = False,
     target_policy: TargetPolicy | None = None,
     team_policy: TargetPolicy | None = None,
-    **overrides: Any,
+    **settings: Any,
 ) -> Batch:
-    """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
+    """Return a batch of worlds, on which all environments are built.
+
+    ``settings`` are further arguments of :class:`Batch`, or any field of :class:`posse.Scenario`.
 
     With ``target_policy`` that policy moves the target of every world; observations, actions and
     rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
     are those of the target, one row and actions of two numbers. Both return a :class:`PairedBatch`;
     they exclude each other.
     """
-    own: dict[str, Any] = {"seed": seed, "split": split, "first_world": first_world, "autoreset": autoreset}
-    own |= {"num_threads": num_threads, "clip_actions": clip_actions}
-    found = get_scenario(scenario, **overrides)
+    own = of_batch(settings)
+    found = get_scenario(scenario, **settings)
     if target_policy is not None and team_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
     inside, side = (team_policy, "team") if target_policy is None else (target_policy, "target")

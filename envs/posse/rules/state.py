@@ -66,7 +66,7 @@ _Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
 
 DERIVED: Final[_Numbers] = {
     **{name: (_I, attrgetter(name)) for name in ("neighbours", "physics_steps", "outage_steps", "walled", "drifts")},
-    "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
+    "settle_steps": (_I, lambda s: min(max(1, round(s.settle_time / s.control_step)), s.horizon)),
     "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),

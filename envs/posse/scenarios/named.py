@@ -150,9 +150,6 @@ def scenario_names() -> tuple[str, ...]:
 def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden; ScenarioError for an unknown name or field.
 
-    A ``horizon`` that is given without ``settle_time``, and makes the episode shorter than that of
-    the scenario, shortens it to the episode.
-
     Args:
         scenario: Its name, or a scenario.
         overrides: Any field of :class:`posse.Scenario`.
@@ -164,7 +161,4 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     else:
         families = "; families, as those of posse.family_names(), are for posse.batches"
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS) + families)
-    if "horizon" in overrides and "settle_time" not in overrides:
-        at_once = found.replace(settle_time=1e-9, **overrides)  # shorter than any episode
-        return at_once.replace(settle_time=min(found.settle_time, at_once.duration))
     return found.replace(**overrides) if overrides else found

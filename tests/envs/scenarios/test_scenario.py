@@ -33,7 +33,6 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"formation_distance": 0.3}, "target"),
     ({"formation_spacing": 0.6}, "tolerance"),
     ({"formation_spacing": 0.9, "robot_radius": 0.5, "formation_distance": 2.0}, "robot_radius"),
-    ({"settle_time": 61.0}, "horizon=600 steps of 0.1 s: set settle_time to at most 60"),
     ({"control_step": 0.12}, "physics_step"),
     ({"horizon": 10**6, "tracker_speed": 9.0}, "at most 500 m"),
     ({"arena": 2.0}, "too small"),
@@ -100,14 +99,6 @@ def test_equal_sides_are_one_and_an_unknown_setting_is_a_wrong_argument() -> Non
     assert posse.get_scenario("search", arena=(20.0, 20.0)) == posse.get_scenario("search")
     with pytest.raises(TypeError, match="unexpected keyword argument 'num_tracker'"):
         posse.get_scenario("smart", num_tracker=3)
-
-
-def test_a_horizon_alone_shortens_the_time_to_settle() -> None:
-    assert posse.get_scenario("constant", horizon=20).settle_time == pytest.approx(2.0)
-    assert posse.get_scenario("constant", horizon=20, control_step=0.05).settle_time == pytest.approx(1.0)
-    assert posse.get_scenario("constant", horizon=200).settle_time == 3.0
-    with pytest.raises(ScenarioError, match=r"horizon=.* whole number"):
-        posse.get_scenario("constant", horizon="20")
 
 
 # What cannot be drawn, and the words of the message.

@@ -97,7 +97,7 @@ class Episode:
             self._held_from = None
         elif self._held_from is None:
             self._held_from = step
-        enough = max(1, round(s.settle_time / s.control_step))
+        enough = min(max(1, round(s.settle_time / s.control_step)), s.horizon)
         if self._held_from is not None and step - self._held_from + 1 >= enough:
             self._first.setdefault("settling", self._held_from)
             if "loss" in self._first:
