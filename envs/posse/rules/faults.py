@@ -62,9 +62,6 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
     if c.break_nearest:
         w.break_step = _drawn_step(c, w, earliest, _BREAKS)
         return
-    if c.break_given:
-        trackers[c.break_number].breaks_at = _drawn_step(c, w, earliest, _BREAKS)
-        return
     for k in range(w.breaks_left):
         chosen = np.int64(bits(w.key, 0, FAULTS, _BREAKS + 2 * k + 1) % np.uint64(n))
         while trackers[chosen].breaks_at != NEVER:

@@ -71,7 +71,6 @@ DERIVED: Final[_Numbers] = {
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
     "break_nearest": (_I, lambda s: s.break_choice == "nearest"),
-    "break_given": (_I, lambda s: s.break_choice == "given"),
     "motion": (_I, lambda s: TARGET_MOTIONS.with_added(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
     "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and s.walled),
     "target_agent": (_I, lambda s: s.target_is_agent),
@@ -265,7 +264,7 @@ TRACKER: Final = record_type(
     *((name, _F) for name in Pose._fields),
     ("per_speed", _F),
     ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
-    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
+    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn")
     *((name, _I) for name in Condition._fields),
     ("slot", _I),  # number of the slot that it occupies; -1: none
     ("could_arrive", _I),  # 1: on a straight line at full speed it could have reached a slot

@@ -191,11 +191,8 @@ class Scenario:
     breaks: int = setting(0, "trackers that break during an episode, below num_trackers", "1", 0, MAX_TRACKERS - 1)
     break_choice: str = setting(
         "nearest",
-        "which one breaks: the nearest to the target then (usually the leader), any, or that of break_number",
-        choices=("nearest", "drawn", "given"),
-    )
-    break_number: int = setting(
-        0, "number of the tracker that breaks with break_choice given", "1", 0, MAX_TRACKERS - 1
+        "which one breaks: the nearest to the target then (usually the leader), or any",
+        choices=("nearest", "drawn"),
     )
     break_window: tuple[float, float] = setting(
         (0.4, 0.6), "interval of the time of a break, as shares of the horizon", "1", 0, 1
@@ -420,10 +417,6 @@ def _in_team(s: Scenario) -> _Conflicts:
             yield "wheel_base", f"{why}: lower it, or tracker_turn_rate"
     if s.breaks >= s.num_trackers:
         yield "breaks", f"at most num_trackers - 1 = {s.num_trackers - 1}"
-    if s.break_choice == "given" and s.breaks > 1:
-        yield "breaks", 'break_choice="given" names one tracker, break_number'
-    if s.breaks and s.break_choice == "given" and s.break_number >= s.num_trackers:
-        yield "break_number", f"trackers are 0 to {s.num_trackers - 1}"
     offsets = s.slot_offsets
     apart = min((math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf)
     if apart <= 2 * max(s.tolerance, s.robot_radius) + 1e-9:
