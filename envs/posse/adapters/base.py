@@ -12,12 +12,12 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
-from posse.engine.arguments import check_choice
 from posse.engine.batch import Batch, of_batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
+from posse.scenarios.setting import check_choice
 from posse.signals.layout import ObservationLayout, StateLayout
 
 

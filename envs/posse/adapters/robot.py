@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import SENSORS
-from posse.engine.arguments import MOST_ACTION, check_count, real_numbers
+from posse.engine.arguments import MOST_ACTION, real_numbers
 from posse.engine.batch import Batch
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
 from posse.rules.state import BROADCAST, config_record, perfect_radio
 from posse.scenarios import Scenario, ScenarioError, get_scenario
+from posse.scenarios.setting import check_count
 from posse.signals.layout import ObservationLayout
 
 _BARELY_LOSSY: Final = 1e-9  # loss of a radio whose messages a world keeps with their ages

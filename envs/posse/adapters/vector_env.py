@@ -13,9 +13,10 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import as_motions
 from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
-from posse.engine.arguments import check_count, mask_of
+from posse.engine.arguments import mask_of
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
+from posse.scenarios.setting import check_count
 
 _Info = dict[str, Any]
 

@@ -9,28 +9,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import unknown
 from posse.numeric import ONE, WIDTH, BoolArray, FloatArray, kernel
 from posse.numeric.lanes import ALL, bits, load
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario
 
 MOST_ACTION: Final = np.float32(1 + 1e-6)
 """Actions up to this are clipped to 1, since rounding may exceed it."""
 _FLOAT32: Final = np.dtype(np.float32)
-
-
-def check_count(name: str, value: object, least: int) -> int:
-    """Return a whole number in [least, 2**63), or raise ScenarioError."""
-    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not least <= value < 2**63:
-        raise ScenarioError(f"{name}={reprlib.repr(value)} must be a whole number in [{least}, 2**63)")
-    return int(value)
-
-
-def check_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
-    """Return one of the choices, or raise ScenarioError."""
-    if not isinstance(value, str) or value not in choices:
-        raise ScenarioError(unknown(name, value, choices))
-    return value
 
 
 def options_of(options: object) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.declarations import Declarations
-from posse.engine.arguments import as_float32, check_choice, check_count, in_box, mask_of, options_of, poses_of
+from posse.engine.arguments import as_float32, in_box, mask_of, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
     START,
@@ -35,7 +35,7 @@ from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.setting import SPLITS
+from posse.scenarios.setting import SPLITS, check_choice, check_count
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
 

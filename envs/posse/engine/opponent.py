@@ -8,12 +8,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from posse.engine.arguments import as_float32, check_choice, check_count, in_box
+from posse.engine.arguments import as_float32, in_box
 from posse.engine.batch import Batch, of_batch
 from posse.engine.kernels import LOOK, Orders, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, ScenarioError, get_scenario
 from posse.scenarios.family import scenario_or_family, shares
+from posse.scenarios.setting import check_choice, check_count
 from posse.signals.layout import ObservationLayout
 
 

@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.arguments import check_choice
 from posse.engine.batch import Batch
 from posse.rendering import RENDER_MODES
 from posse.rendering.camera import Camera
@@ -21,6 +20,7 @@ from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
 from posse.rendering.style import DESIGN_SIZE, TRACKER, Colour
 from posse.scenarios import Scenario
+from posse.scenarios.setting import check_choice
 
 LEAST_SIZE: Final = 200  # px, of width and height
 

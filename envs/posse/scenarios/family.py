@@ -14,22 +14,15 @@ import numpy as np
 from posse.declarations import unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import SPLITS, ScenarioError, UnknownSettingError, fail
+from posse.scenarios.setting import SPLITS, ScenarioError, UnknownSettingError, check_choice, check_count, fail
 
 Range = tuple[float, float]
 """Least and greatest value of a setting, both included."""
 
 BLOCK: Final = 10
 """Worlds in a row of the same drawn scenario: world i of a family plays scenario i // BLOCK."""
-_FIXED: Final = {
-    "version": "which numbers a behaviour",
-    "control_step": "which policies are made for",
-    "physics_step": "which policies are made for",
-    "horizon": "since episodes of a family have one length",
-    "sonar_beams": "on which the length of an observation depends",
-    "num_neighbours": "on which the length of an observation depends",
-    "message_size": "on which the length of an observation depends",
-}
+_OF_ALL: Final = {"version", "control_step", "physics_step", "horizon", "sonar_beams", "num_neighbours", "message_size"}
+"""Settings on which the lengths of steps, episodes and observations depend, and the version."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,13 +76,9 @@ class Family:
 
     def draw(self, index: int, seed: int = 0, split: str = "train") -> Scenario:
         """Return a scenario of the family; it depends on nothing but index, seed and split."""
-        whole: dict[str, Any] = {"index": index, "seed": seed}
-        for name, value in whole.items():
-            if not isinstance(value, int | np.integer) or value < 0:
-                fail(name, value, "it must be a whole number, at least 0")
-        if split not in SPLITS:
-            raise ScenarioError(unknown("split", split, SPLITS))
-        shares = np.random.default_rng([seed, *f"{split}".encode(), index]).random(len(self.ranges))
+        split = check_choice("split", split, SPLITS)
+        key = [check_count("seed", seed, 0), *split.encode(), check_count("index", index, 0)]
+        shares = np.random.default_rng(key).random(len(self.ranges))
         values: dict[str, float] = {}
         for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):
             steps = isinstance(low, int) and isinstance(high, int)
@@ -113,8 +102,8 @@ def _accepted(name: str, bounds: Range) -> Range:
         raise UnknownSettingError(unknown("setting", name, known))
     if len(bounds) != 2:
         fail(name, bounds, "a range must be two numbers, (least, greatest)")
-    if name in _FIXED:
-        fail(name, bounds, f"a family cannot vary {name}, {_FIXED[name]}: set it on its base")
+    if name in _OF_ALL:
+        fail(name, bounds, f"a family cannot vary {name}, on which its policies and results rest: set it on its base")
     several = any(isinstance(value, (tuple, list)) for value in bounds)
     if several or ("int" not in known[name].kind and not known[name].kind.startswith("float")):
         fail(name, bounds, "a family varies settings that are one number")

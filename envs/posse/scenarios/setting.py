@@ -31,6 +31,20 @@ def fail(name: str, value: object, allowed: str) -> NoReturn:
     raise ScenarioError(f"{name}={reprlib.repr(value)} is refused: {allowed}")
 
 
+def check_count(name: str, value: object, least: int) -> int:
+    """Return a whole number in [least, 2**63), or raise ScenarioError."""
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not least <= value < 2**63:
+        raise ScenarioError(f"{name}={reprlib.repr(value)} must be a whole number in [{least}, 2**63)")
+    return int(value)
+
+
+def check_choice(name: str, value: object, choices: Iterable[str]) -> str:
+    """Return one of the choices, or raise ScenarioError."""
+    if not isinstance(value, str) or value not in choices:
+        raise ScenarioError(unknown(name, value, choices))
+    return value
+
+
 @dataclass(frozen=True)
 class Setting:
     """Declaration of one field of a scenario.
@@ -100,9 +114,7 @@ class Setting:
             case "str":
                 if not isinstance(value, str):
                     fail(name, value, "it must be a string")
-                if self.choices is not None and value not in self.choices:
-                    raise ScenarioError(unknown(name, value, self.choices))
-                return value
+                return value if self.choices is None else check_choice(name, value, self.choices)
             case "tuple[str, ...]":
                 names = (value,) if several is None else tuple(several)
                 if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
