@@ -31,9 +31,9 @@ from posse.signals.layout import ObservationLayout
 
 __version__ = "0.1.0"
 
-METRICS: Final[tuple[Metric, ...]] = declarations.METRICS.built_in()
+METRICS: Final[tuple[Metric, ...]] = declarations.METRICS.of()
 """Every built-in metric, in the order in which they are reported."""
-REWARD_TERMS: Final[tuple[RewardTerm, ...]] = declarations.REWARD_TERMS.built_in()
+REWARD_TERMS: Final[tuple[RewardTerm, ...]] = declarations.REWARD_TERMS.of()
 """The built-in reward terms, in the order in which they are reported."""
 
 

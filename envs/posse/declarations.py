@@ -174,14 +174,10 @@ class Registry(dict[str, D]):
 
         return declare
 
-    def built_in(self) -> tuple[D, ...]:
-        """Return the built-in declarations, in order."""
-        return tuple(each for each in self.values() if each.built_in)
-
-    def with_added(self, *names: str) -> tuple[D, ...]:
-        """Return the built-in declarations, then the named ones, each once; KeyError for an unknown name."""
-        added = (self[name] for name in dict.fromkeys(names))
-        return (*self.built_in(), *(each for each in added if not each.built_in))
+    def of(self, *names: str) -> tuple[D, ...]:
+        """Return the built-in declarations, in order, then the named ones, each once; KeyError for an unknown name."""
+        built_in = [each for each in self.values() if each.built_in]
+        return tuple(dict.fromkeys((*built_in, *(self[name] for name in names))))
 
     def __missing__(self, name: str) -> D:
         raise KeyError(undeclared(self.kind, name, self))
@@ -517,11 +513,11 @@ class Declarations(NamedTuple):
     @classmethod
     def of(cls, scenario: Any) -> Declarations:
         """Return the declarations of a scenario."""
-        fields = FIELDS.with_added(*scenario.extra_fields)
+        fields = FIELDS.of(*scenario.extra_fields)
         return cls(
             tuple(field for field in fields if field.when is None or field.when(scenario)),
-            TARGET_MOTIONS.with_added(scenario.target_motion),
-            SENSORS.with_added(scenario.sensor),
-            METRICS.with_added(*scenario.metrics),
-            REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
+            TARGET_MOTIONS.of(scenario.target_motion),
+            SENSORS.of(scenario.sensor),
+            METRICS.of(*scenario.metrics),
+            REWARD_TERMS.of(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
         )

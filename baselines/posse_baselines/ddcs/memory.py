@@ -33,7 +33,7 @@ _MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
 
 # --- what a team has in common -------------------------------------------------------------------
 
-_FIELDS: Final = (*(field.name for field in FIELDS.built_in()), "sonar", "neighbour_message")
+_FIELDS: Final = (*(field.name for field in FIELDS.of()), "sonar", "neighbour_message")
 _RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks

@@ -159,19 +159,18 @@ def find_gaps(c: Record, s: Record) -> None:
 
 
 @compiled
-def find_slots(c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: Record) -> None:
-    """Write the nearest slot that is not in ``taken`` of eight trackers from ``first`` on.
-
-    ``taken`` is a bit set; the result is -1 if all slots are taken.
-    """
-    ahead, left = in_frame(load(s.x, first) - w.x, load(s.y, first) - w.y, w.frame_cos, w.frame_sin)
-    nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
-    for slot in range(c.num_trackers):
-        if taken & (BIT << np.uint64(slot)) == NO_BITS:
-            dx, dy = ahead - slots[slot].x, left - slots[slot].y
-            d2 = dx * dx + dy * dy
-            nearest = choose(d2 < nearest2, s.index[slot], nearest)
-            nearest2 = lesser(nearest2, d2)
-    store(s.slot, first, nearest)
-    store(s.slot_distance2, first, nearest2)
-    store(s.slot_distance, first, root(nearest2))
+def find_slots(c: Record, w: Record, slots: Records, taken: np.uint64, s: Record) -> None:
+    """Write each tracker's nearest slot that is not in the bit set ``taken``, and its distance; -1: all are taken."""
+    for block in range(blocks(c.num_trackers)):
+        i = WIDTH * block
+        ahead, left = in_frame(load(s.x, i) - w.x, load(s.y, i) - w.y, w.frame_cos, w.frame_sin)
+        nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
+        for slot in range(c.num_trackers):
+            if taken & (BIT << np.uint64(slot)) == NO_BITS:
+                dx, dy = ahead - slots[slot].x, left - slots[slot].y
+                d2 = dx * dx + dy * dy
+                nearest = choose(d2 < nearest2, s.index[slot], nearest)
+                nearest2 = lesser(nearest2, d2)
+        store(s.slot, i, nearest)
+        store(s.slot_distance2, i, nearest2)
+        store(s.slot_distance, i, root(nearest2))

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
-from posse.rules.discs import blocks, find_slots
+from posse.numeric import ONE, ZERO, Record, Records, compiled
+from posse.rules.discs import find_slots
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NEVER, NO_BITS
 
@@ -28,9 +28,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     taken = NO_BITS
-    for block in range(blocks(c.num_trackers)):
-        first = WIDTH * block
-        find_slots(c, w, first, slots, taken, s)
+    find_slots(c, w, slots, taken, s)
     occupied = 0
     near2 = c.tolerance * c.tolerance
     for i, t in enumerate(trackers):
@@ -46,9 +44,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 occupied += 1
                 t.slot = best
     if taken != NO_BITS:
-        for block in range(blocks(c.num_trackers)):
-            first = WIDTH * block
-            find_slots(c, w, first, slots, taken, s)
+        find_slots(c, w, slots, taken, s)
     for i, t in enumerate(trackers):
         if t.slot < 0 and s.slot[i] >= ZERO:
             t.slot_distance = s.slot_distance[i]

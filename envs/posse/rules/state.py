@@ -71,10 +71,10 @@ DERIVED: Final[_Numbers] = {
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
     "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
     "break_nearest": (_I, lambda s: s.break_choice == "nearest"),
-    "motion": (_I, lambda s: TARGET_MOTIONS.with_added(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
+    "motion": (_I, lambda s: TARGET_MOTIONS.of(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
     "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and s.walled),
     "target_agent": (_I, lambda s: s.target_is_agent),
-    "sensor": (_I, lambda s: SENSORS.with_added(s.sensor).index(SENSORS[s.sensor])),
+    "sensor": (_I, lambda s: SENSORS.of(s.sensor).index(SENSORS[s.sensor])),
     "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
     "measured": (_I, _measured),  # 0: sensors return the target's true position
     "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
