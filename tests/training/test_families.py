@@ -33,11 +33,6 @@ def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: i
     )
 
 
-def test_a_split_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"unknown split 'training'.*known: train, validation, test"):
-        OPEN.draw(0, 0, "training")
-
-
 def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
     speeds = np.array([OPEN.draw(k).target_speed for k in range(400)])
     assert abs(speeds.mean() - 0.5) < 0.02

@@ -50,5 +50,3 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
         plain.step({agent: MOTIONS[number] for agent, number in chosen.items()})
         discrete.step(chosen)
         assert np.array_equal(plain.state(), discrete.state())
-    for number, motion in enumerate(MOTIONS):
-        assert tuple(motion) == (number // 5 - 1, (number % 5 - 2) / 2)

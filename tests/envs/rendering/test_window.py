@@ -1,7 +1,6 @@
 """The window of the mode "human": pause, one step, speed, close; in anybody's loop."""
 
 import threading
-from collections.abc import Mapping
 
 import numpy as np
 import pygame
@@ -17,10 +16,10 @@ def press(*keys: int) -> None:
         pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key))
 
 
-def opened(keys: Mapping[str, str] | None = None) -> tuple[Renderer, Window, posse.Batch]:
+def opened() -> tuple[Renderer, Window, posse.Batch]:
     batch = posse.batch("constant", 1, seed=3)
     batch.reset()
-    renderer = Renderer(batch.scenario, "human", (400, 300), keys=keys)
+    renderer = Renderer(batch.scenario, "human", (400, 300))
     assert renderer.window is not None
     return renderer, renderer.window, batch
 
@@ -37,7 +36,6 @@ def test_a_window_shows_the_frame_above_a_line_with_its_keys() -> None:
     assert (shown[300:] < 200).any()
     renderer.close()
     assert not pygame.display.get_init()
-    renderer.close()
 
 
 def test_the_window_of_an_environment_can_be_paused_stepped_and_closed() -> None:
@@ -60,7 +58,6 @@ def test_the_window_of_an_environment_can_be_paused_stepped_and_closed() -> None
     env.step(actions)  # goes on by itself
     press(pygame.K_SPACE, pygame.K_ESCAPE)
     env.step(actions)
-    assert not pygame.display.get_init()
     env.step(actions)  # without a window
     assert env.render() is None
     assert not pygame.display.get_init()
@@ -74,19 +71,6 @@ def test_speed_is_that_of_the_world_and_can_be_changed() -> None:
         for _ in range(6):  # at the highest speed, one in six is shown
             renderer.draw(batch)
         assert window.speed == speed
-    renderer.close()
-
-
-def test_the_callers_keys_end_a_pause_and_are_returned() -> None:
-    renderer, window, batch = opened({"n": "next"})
-    press(pygame.K_x, pygame.K_SPACE, pygame.K_n)
-    renderer.draw(batch)
-    assert window.paused
-    assert window.pressed == {"x", "n"}
-    assert window.held("x", "y") == {"x"}
-    press(pygame.K_s)
-    renderer.draw(batch)
-    assert not window.pressed
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     renderer.draw(batch)
     assert renderer.window is None
