@@ -15,7 +15,7 @@ from posse.engine.batch import Batch
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
-from posse.rules.state import BROADCAST, config_record, perfect_radio
+from posse.rules.state import BROADCAST, perfect_radio
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.scenarios.setting import check_count
 from posse.signals.layout import ObservationLayout
@@ -107,7 +107,7 @@ class Robot:
         if perfect_radio(kept):  # such a world stores no messages, since they would equal the state
             kept = kept.replace(radio_loss=_BARELY_LOSSY)
         self._world = Batch(kept, 1, num_threads=1)
-        self._config = config_record(kept).view(np.recarray)[0]
+        self._config = self._world._fixed.config[0]
         self.reset()
 
     def reset(self) -> None:
@@ -234,24 +234,18 @@ class Robot:
         me, step = self._me, self._step_of(fix.age)
         if step <= me.fix_step:
             return
-        new = np.zeros(1, BROADCAST).view(np.recarray)[0]
-        new.fix_step = step
-        _place(new.fix, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
-        new.fix.frame_cos, new.fix.frame_sin = new.fix.cos, new.fix.sin
+        new, config = np.zeros(1, BROADCAST)[0], self._config
+        new.fix_step, f = step, new.fix
+        _place(f, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
+        f.frame_cos, f.frame_sin = f.cos, f.sin
         if fix.frame is not None:
-            new.fix.frame_cos, new.fix.frame_sin = math.cos(fix.frame), math.sin(fix.frame)
+            f.frame_cos, f.frame_sin = math.cos(fix.frame), math.sin(fix.frame)
         elif me.fix_step >= 0:
-            new.fix.frame_cos, new.fix.frame_sin = me.fix.frame_cos, me.fix.frame_sin
+            f.frame_cos, f.frame_sin = me.fix.frame_cos, me.fix.frame_sin
+            most = config.frame_c, config.frame_s
             for _ in range(step - int(me.fix_step)):
-                new.fix.frame_cos, new.fix.frame_sin = follow_heading(
-                    new.fix.frame_cos,
-                    new.fix.frame_sin,
-                    new.fix.cos,
-                    new.fix.sin,
-                    self._config.frame_c,
-                    self._config.frame_s,
-                )
-        take_fix(self._config, me, new)
+                f.frame_cos, f.frame_sin = follow_heading(f.frame_cos, f.frame_sin, f.cos, f.sin, *most)
+        take_fix(config, me, new)
 
     def _hear(self, message: Heard) -> None:
         """Store a message, unless a later one of the same team-mate was heard, and take its fix."""
