@@ -234,7 +234,7 @@ class FieldDeclaration(Declaration):
             raise self.error(f"size={self.size!r} must be a whole number from 1 to {MOST_NUMBERS}")
 
     @property
-    def of_mate(self) -> bool:
+    def of_neighbour(self) -> bool:
         """Whether it describes a team-mate."""
         return "m" in parameters_of(self.function)
 
@@ -248,11 +248,11 @@ class FieldDeclaration(Declaration):
         low, high = self._bound("low", scenario), self._bound("high", scenario)
         if low > high:
             raise self.error(f"low={low:g} is above high={high:g} in {scenario.name!r}")
-        empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
+        empty = 0.0 if self.unknown is None and self.of_neighbour else self.unknown
         if empty is not None and not (is_number(empty) and low <= empty <= high):
             where = f"between low={low:g} and high={high:g} in {scenario.name!r}"
             raise self.error(f"unknown={empty!r} is not a number {where}")
-        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
+        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_neighbour)
 
     def _bound(self, name: str, scenario: Any) -> float:
         """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""

@@ -92,7 +92,7 @@ class PosseEnv(EnvBase):
         if "team_policy" in settings:
             raise TypeError("team_policy= is not possible: a PosseEnv has trackers; make its target an agent")
         self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)
-        single_action_space(self.batch.scenario, discrete_actions)  # raises if impossible
+        single_action_space(self.batch.scenario.message_size, discrete_actions)  # raises if impossible
         super().__init__(device=device, batch_size=(num_worlds,))
         self._state_layout = StateLayout(self.batch.scenario) if state else None
         self._discrete = discrete_actions

@@ -39,15 +39,15 @@ def box(low: npt.ArrayLike, high: npt.ArrayLike) -> spaces.Box:
     return spaces.Box(low - apart, high + apart, dtype=np.float32)
 
 
-def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]:
+def single_action_space(message_size: int, discrete: bool) -> spaces.Space[Any]:
     """Return the action space of one robot; ScenarioError for messages, which are not discrete."""
     if not isinstance(discrete, bool):
         raise ScenarioError(f"discrete_actions={reprlib.repr(discrete)} is not possible: it is True or False")
     if not discrete:
-        return spaces.Box(-1.0, 1.0, (2 + scenario.message_size,), np.float32)
-    if scenario.message_size:
+        return spaces.Box(-1.0, 1.0, (2 + message_size,), np.float32)
+    if message_size:
         raise ScenarioError(
-            f"discrete_actions=True cannot encode messages of message_size={scenario.message_size}: unset one of them"
+            f"discrete_actions=True cannot encode messages of message_size={message_size}: unset one of them"
         )
     return spaces.Discrete(len(MOTIONS))
 

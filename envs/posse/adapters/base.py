@@ -78,11 +78,11 @@ class BatchEnv:
 
     def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Return the spaces of an agent's observations and actions."""
-        scenario = self.scenario.replace(message_size=self.batch.action_shape[2] - 2)
-        observation, action = box(*self.layout.bounds()), single_action_space(scenario, self._discrete)
+        observation = box(*self.layout.bounds())
+        action = single_action_space(self.batch.action_shape[2] - 2, self._discrete)
         if isinstance(self._rows, int):
             return observation, action
-        return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
+        return batch_space(observation, self.scenario.num_trackers), batch_space(action, self.scenario.num_trackers)
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start episodes, of an arbitrary seed if none was ever given, and return the observations (E, rows, F)."""

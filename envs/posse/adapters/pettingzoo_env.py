@@ -62,12 +62,12 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
         self.agents: list[str] = []
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
-        self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
+        self.action_spaces = {
+            a: single_action_space(self.scenario.message_size, self._discrete) for a in self.possible_agents
+        }
         self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self.np_random = np.random.default_rng(
-            settings.get("seed")
-        )  # for SuperSuit's frame_skip_v0; worlds draw otherwise
+        self.np_random = np.random.default_rng(settings.get("seed"))  # that of SuperSuit's frame_skip_v0; no world's
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""

@@ -5,7 +5,6 @@ The environments, training and evaluation are built on :class:`Batch`.
 
 from __future__ import annotations
 
-import os
 import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ from posse.engine.kernels import (
     fixed_for,
     kernel_of,
 )
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, WorldArrays
@@ -100,7 +99,7 @@ class Batch(OwnArrays):
         self.seed = check_count("seed", seed, 0)
         self.split = check_choice("split", split, SPLITS)
         self.autoreset = check_choice("autoreset mode", autoreset, ("next_step", "same_step", "disabled"))
-        self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
+        self.num_threads = MOST_THREADS if num_threads is None else check_count("num_threads", num_threads, 1)
         if not isinstance(clip_actions, bool):
             raise ScenarioError(f"clip_actions={reprlib.repr(clip_actions)} must be True or False")
         self.clip_actions = clip_actions

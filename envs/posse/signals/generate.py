@@ -65,8 +65,8 @@ class _Module:
     def __init__(self, declarations: Declarations) -> None:
         self.functions: dict[str, Function] = {}
         _, motions, sensors, metrics, terms = declarations
-        own = [field for field in declarations.fields if not field.of_mate]
-        of_mate = [field for field in declarations.fields if field.of_mate]
+        own = [field for field in declarations.fields if not field.of_neighbour]
+        of_mate = [field for field in declarations.fields if field.of_neighbour]
         summed = [metric for metric in metrics if metric.summed]
         functions = {
             "write_own(c, v, rows)": self._columns(own),
@@ -119,7 +119,7 @@ class _Module:
             yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
             if "v" not in parameters_of(field.function):  # a constant
                 yield from (f"{column} = eight(float32({column}))" for column in mine)
-            if field.of_mate:
+            if field.of_neighbour:
                 yield from (f"{column} = choose(there, {column}, float32({field.unknown or 0}))" for column in mine)
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
