@@ -66,8 +66,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, _Info]:
         """Advance every world by one control step; errors are those of :meth:`posse.Batch.step`."""
         motions = as_motions("the array of actions", actions, self.action_space.shape, self._discrete)
-        found = self.batch.step(motions.reshape(self.batch.action_shape))
-        observations, rewards, terminated, truncated, infos = found
+        observations, rewards, terminated, truncated, infos = self.batch.step(motions.reshape(self.batch.action_shape))
         if self.render_mode == "human":
             self._draw()
         last, ended, infos, more = infos.pop("final_obs", None), terminated | truncated, self._own(infos), {}
