@@ -47,6 +47,12 @@ def work_for(num_trackers: int) -> Work:
 
 
 @compiled
+def work_of(works: Work, thread: int) -> Work:
+    """Return the arrays of a thread."""
+    return Work(works.cost[thread], works.assigning[thread], works.discs[thread])
+
+
+@compiled
 def slot_velocity(velocity: complex, frame_rate: float, arm: complex) -> complex:
     """Return the velocity (m/s) of a slot on an arm (m) that turns at ``frame_rate`` (rad/s)."""
     return complex(velocity.real - frame_rate * arm.imag, velocity.imag + frame_rate * arm.real)

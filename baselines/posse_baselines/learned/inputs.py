@@ -18,7 +18,7 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, kernel, over_worlds
 from posse_baselines.ddcs.memory import offsets_of
-from posse_baselines.laws.steering import Work, work_for
+from posse_baselines.laws.steering import work_for, work_of
 from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, Known, write_features
 from posse_baselines.policy import PolicyError, check_observations
 
@@ -210,7 +210,7 @@ def _patience(scenario: Scenario) -> float:
 def _write_all(
     rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
 ) -> None:
-    known, places, w = given
-    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
+    known, places, works = given
+    work = work_of(works, thread)
     for r in range(first, end):
         write_features(rows[r], known, estimates[r], places[thread], work, features[r])

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from posse.numeric import MOST_THREADS, ONE, ZERO, FloatArray, OwnArrays, compiled, kernel, over_worlds
 from posse_baselines.policy import PolicyError
@@ -74,40 +73,36 @@ class Network(OwnArrays):
             named[f"layers.{k}.bias"] = bias
         return {name: np.ascontiguousarray(array) for name, array in named.items()}
 
-    def flat(self) -> Flat:
+    def layers(self) -> Layers:
         """Return the network as :func:`forward` reads it."""
-        return Flat(
-            np.ascontiguousarray(self.mean),
-            np.ascontiguousarray(self.scale),
-            np.array([self.inputs, *map(len, self.weights)], np.int64),
-            np.concatenate([weight.T.reshape(-1) for weight in self.weights]),
-            np.concatenate(self.biases),
-            int(self.activation == "tanh"),
-            int(self.output == "tanh"),
+        return Layers(
+            np.array(self.mean),
+            np.array(self.scale),
+            tuple(np.array(weight.T, order="C") for weight in self.weights),
+            tuple(map(np.array, self.biases)),
+            self.activation == "tanh",
+            self.output == "tanh",
         )
 
 
-class Flat(NamedTuple):
-    """A network as the kernel reads it."""
+class Layers(NamedTuple):
+    """A network as the kernel reads it: weights lie input by input, so that the inner loop vectorises."""
 
     mean: FloatArray
     scale: FloatArray
-    sizes: npt.NDArray[np.int64]
-    """Numbers that the first layer reads, and that each layer computes."""
-    weights: FloatArray
-    """Of all layers, input by input, so that the inner loop vectorises."""
-    biases: FloatArray
-    hyperbolic: int
-    squashed: int
+    weights: tuple[FloatArray, ...]
+    biases: tuple[FloatArray, ...]
+    hyperbolic: bool
+    squashed: bool
 
 
-def forward(network: Flat, inputs: FloatArray) -> FloatArray:
+def forward(network: Layers, inputs: FloatArray) -> FloatArray:
     """Return the outputs (rows, outputs) for inputs (rows, inputs).
 
     Each row is computed alone, so that it never depends on the others: the rounding of a matrix library does.
     """
-    outputs = np.empty((len(inputs), network.sizes[-1]), np.float32)
-    scratch = np.empty((MOST_THREADS, 2, network.sizes.max()), np.float32)
+    outputs = np.empty((len(inputs), len(network.biases[-1])), np.float32)
+    scratch = np.empty((MOST_THREADS, 2, max(map(len, (network.mean, *network.biases)))), np.float32)
     # The threads share out rows as if each were a world of one tracker.
     over_worlds(_forward_rows, (network, inputs, scratch, outputs), len(inputs), 1)
     return outputs
@@ -115,42 +110,38 @@ def forward(network: Flat, inputs: FloatArray) -> FloatArray:
 
 @kernel
 def _forward_rows(
-    network: Flat, inputs: FloatArray, scratch: FloatArray, outputs: FloatArray, thread: int, first: int, end: int
+    network: Layers, inputs: FloatArray, scratch: FloatArray, outputs: FloatArray, thread: int, first: int, end: int
 ) -> None:
-    sizes = network.sizes
+    last = len(network.weights) - 1
     for r in range(first, end):
         x, y = scratch[thread, 0], scratch[thread, 1]
-        for k in range(sizes[0]):
+        for k in range(len(network.mean)):
             normalised = (inputs[r, k] - network.mean[k]) * network.scale[k]
             x[k] = min(max(normalised, -LIMIT), LIMIT)
-        at_weight, at_bias = 0, 0
-        for layer in range(len(sizes) - 1):
-            size, count = sizes[layer], sizes[layer + 1]
-            _add_products(x[:size], network.weights[at_weight:], network.biases[at_bias : at_bias + count], y)
-            at_weight += size * count
-            at_bias += count
-            if layer < len(sizes) - 2:
-                for j in range(count):
+        for layer in range(last + 1):
+            weights, biases = network.weights[layer], network.biases[layer]
+            _add_products(x[: len(weights)], weights, biases, y)
+            if layer < last:
+                for j in range(len(biases)):
                     y[j] = np.float32(math.tanh(y[j])) if network.hyperbolic else max(y[j], ZERO)
             x, y = y, x
-        for j in range(sizes[-1]):
+        for j in range(outputs.shape[1]):
             out = np.float32(math.tanh(x[j])) if network.squashed else x[j]
             outputs[r, j] = min(max(out, -ONE), ONE)
 
 
 @compiled
 def _add_products(x: FloatArray, weights: FloatArray, biases: FloatArray, y: FloatArray) -> None:
-    """Write biases + weights x to y; weights lie input by input, of which four are added at a time."""
+    """Write biases + weights x to y; weights (inputs, outputs) are added four inputs at a time."""
     count, rest = len(biases), len(x) // 4 * 4
-    rows = weights[: len(x) * count].reshape(len(x), count)
     for j in range(count):
         y[j] = biases[j]
     for i in range(0, rest, 4):
         p, q, r, s = x[i], x[i + 1], x[i + 2], x[i + 3]
-        a, b, c, d = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        a, b, c, d = weights[i], weights[i + 1], weights[i + 2], weights[i + 3]
         for j in range(count):
             y[j] = y[j] + p * a[j] + q * b[j] + r * c[j] + s * d[j]
     for i in range(rest, len(x)):
-        p, a = x[i], rows[i]
+        p, a = x[i], weights[i]
         for j in range(count):
             y[j] += p * a[j]

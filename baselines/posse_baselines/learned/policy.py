@@ -105,7 +105,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             network.outputs - MOTION, encoding.message_size, adviser.message_size if adviser is not None else 0
         )
         self.safeguard = safeguard
-        self._flat = network.flat()
+        self._layers = network.layers()
         if not isinstance(card, Mapping):
             raise PolicyError(f"its card must be a mapping of names to values, not {card!r:.80}")
         name, side = card.get("name", "learned"), card.get("side", "trackers")
@@ -151,7 +151,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         """Return the outputs of the network (E N, 2 + m) for its inputs."""
-        return forward(self._flat, inputs)
+        return forward(self._layers, inputs)
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""

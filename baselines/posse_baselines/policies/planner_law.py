@@ -27,6 +27,7 @@ from posse_baselines.laws.steering import (
     slot_velocity,
     way_round,
     work_for,
+    work_of,
 )
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
@@ -66,20 +67,6 @@ class Teams(NamedTuple):
     work: Work
 
 
-class Scene(NamedTuple):
-    """One world as the law reads it."""
-
-    teams: Teams
-    config: Record
-    world: Record
-    trackers: Records
-    obstacles: Records
-    ways: Records
-    plans: Records
-    frame_rate: float
-    """Turn rate of the slot frame, rad/s."""
-
-
 def teams_of(scenario: Scenario, ways: Records) -> Teams:
     """Return teams that play ways (E, N) and have no slots yet."""
     n = ways.shape[1]
@@ -100,67 +87,62 @@ def velocity_of(r: Record) -> complex:
 
 
 @compiled
-def arm_of(scene: Scene, slot: complex) -> complex:
+def arm_of(w: Record, slot: complex) -> complex:
     """Return where a slot is from the target, m."""
-    return slot * complex(scene.world.frame_cos, scene.world.frame_sin)
+    return slot * complex(w.frame_cos, w.frame_sin)
 
 
 @compiled
-def assign_slots(scene: Scene, work: Work) -> None:
-    """Assign the working trackers to slots with the least total arrival time."""
-    w, plans, n = scene.world, scene.plans, scene.config.num_trackers
+def assign_slots(teams: Teams, worlds: Any, e: int, work: Work) -> None:
+    """Assign the working trackers of world e to slots with the least total arrival time."""
+    w, plans, n = worlds.world[e], teams.plans[e], len(teams.slots)
     work.cost[:] = 0.0
     for i in range(n):
-        t = scene.trackers[i]
+        t = worlds.tracker[e, i]
         if t.broken_at != NEVER:
             continue
         for k in range(n):
-            slot = scene.teams.slots[k]
-            way = complex(w.x, w.y) + arm_of(scene, slot) - complex(t.x, t.y)
+            way = complex(w.x, w.y) + arm_of(w, teams.slots[k]) - complex(t.x, t.y)
             time = intercept_time(way, velocity_of(w), float(t.max_speed))
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
-            time += scene.teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
+            time += teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
             work.cost[i, k] = time
     assign(work.cost, work.assigning)
     for i in range(n):
-        if scene.trackers[i].broken_at == NEVER:
+        if worlds.tracker[e, i].broken_at == NEVER:
             plans[i].slot = int(work.assigning[0, i])
 
 
 @compiled
-def surround(scene: Scene, i: int, discs: Records) -> int:
-    """List what is near tracker i, as discs for the safeguard; return how many things that are."""
-    c, w, t = scene.config, scene.world, scene.trackers[i]
-    count, two = 0, 2.0 * c.robot_radius
-    way = complex(w.x, w.y) - complex(t.x, t.y)
-    count = put_near(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
+def surround(c: Record, worlds: Any, e: int, i: int, discs: Records) -> int:
+    """List what is near tracker i of world e, as discs for the safeguard; return how many things that are."""
+    w, t = worlds.world[e], worlds.tracker[e, i]
+    here, count, two = complex(t.x, t.y), 0, 2.0 * c.robot_radius
+    count = put_near(discs, count, complex(w.x, w.y) - here, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
-        other = scene.trackers[j]
-        way = complex(other.x, other.y) - complex(t.x, t.y)
+        other = worlds.tracker[e, j]
         if j != i:
-            count = put_near(discs, count, way, velocity_of(other), two, _MARGIN)
+            count = put_near(discs, count, complex(other.x, other.y) - here, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
-        disc = scene.obstacles[k]
-        way, reach = complex(disc.x, disc.y) - complex(t.x, t.y), disc.radius + c.robot_radius
+        disc = worlds.obstacle[e, k]
+        way, reach = complex(disc.x, disc.y) - here, disc.radius + c.robot_radius
         if dot(way, way) < (NEAR + reach) * (NEAR + reach):
             count = put_disc(discs, count, way, 0j, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, c, complex(t.x, t.y), c.robot_radius, _MARGIN)
+        count = put_walls(discs, count, c, here, c.robot_radius, _MARGIN)
     return count
 
 
 @compiled
-def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
-    """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
-    w, t, way, place = scene.world, scene.trackers[i], scene.ways[i], scene.teams.slots[scene.plans[i].slot]
-    arm, start = arm_of(scene, place), complex(t.x, t.y) - complex(w.x, w.y)
-    shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
-    velocity = slot_velocity(velocity_of(w), scene.frame_rate, arm + shift)
-    goal = way_round(start, arm + shift, _CLEARANCE)
-    return approach_velocity(goal - start, velocity, way.gain, float(t.max_speed), acceleration)
+def wanted_velocity(w: Record, t: Record, way: Record, slot: complex, frame_rate: float, most: float) -> complex:
+    """Return the velocity (m/s) on a course round the target that meets a slot, braked by at ``most`` so many m/s²."""
+    arm, start = arm_of(w, slot), complex(t.x, t.y) - complex(w.x, w.y)
+    aim = arm + complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
+    velocity = slot_velocity(velocity_of(w), frame_rate, aim)
+    return approach_velocity(way_round(start, aim, _CLEARANCE) - start, velocity, way.gain, float(t.max_speed), most)
 
 
 @compiled
@@ -172,13 +154,14 @@ def frame_rate_of(c: Record, w: Record) -> float:
 
 
 @compiled
-def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
-    """Write the actions (N, 2 + m) of one world's team."""
-    c, w = scene.config, scene.world
-    if w.step % _REPLAN_STEPS == 0 or scene.plans[0].slot < 0:
-        assign_slots(scene, work)
+def drive_team(teams: Teams, worlds: Any, e: int, work: Work, actions: FloatArray) -> None:
+    """Write the actions (N, 2 + m) of the team of world e."""
+    c, w = teams.config[0], worlds.world[e]
+    if w.step % _REPLAN_STEPS == 0 or teams.plans[e, 0].slot < 0:
+        assign_slots(teams, worlds, e, work)
+    frame_rate = frame_rate_of(c, w)
     for i in range(c.num_trackers):
-        t, me = scene.trackers[i], scene.plans[i]
+        t, me = worlds.tracker[e, i], teams.plans[e, i]
         if t.broken_at != NEVER:
             actions[i, 0], actions[i, 1] = -1.0, 0.0
             continue
@@ -186,9 +169,8 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
         me.acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else UNLIMITED
         me.turn_acceleration = 1.0 / c.per_turn_acceleration if c.per_turn_acceleration > 0.0 else UNLIMITED
-        velocity = wanted_velocity(scene, i, me.acceleration)
-        discs = work.discs[: surround(scene, i, work.discs)]
-        me.wish, _ = safe_velocity(me, discs, velocity)
+        velocity = wanted_velocity(w, t, teams.ways[e, i], teams.slots[me.slot], frame_rate, me.acceleration)
+        me.wish, _ = safe_velocity(me, work.discs[: surround(c, worlds, e, i, work.discs)], velocity)
         v, omega = regulate(me, me.wish)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-me.dt / c.actuator_lag)) - 1.0
@@ -201,19 +183,7 @@ def drive_all(
     teams: Teams, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
-    w = teams.work
-    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread])
+    work = work_of(teams.work, thread)
     for e in range(first, end):
         if going[e]:
-            config, world = teams.config[0], worlds.world[e]
-            scene = Scene(
-                teams,
-                config,
-                world,
-                worlds.tracker[e],
-                worlds.obstacle[e],
-                teams.ways[e],
-                teams.plans[e],
-                frame_rate_of(config, world),
-            )
-            drive_team(scene, work, actions[e])
+            drive_team(teams, worlds, e, work, actions[e])
