@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
-from posse.adapters.actions import MOTIONS
+from posse.adapters.actions import as_motions
 from posse.numeric import BoolArray, FloatArray
 
 Memory = Any
@@ -154,19 +154,11 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         self._discrete = discrete_actions
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the function's actions, (E, N, 2 + m), and the memory; PolicyError if they have another shape."""
+        """Return the function's actions, (E, N, 2 + m), and the memory; ValueError if they have another shape."""
         found = np.asarray(self._function(observations))
-        numbered = self._discrete and found.dtype.kind in "iu" and bool(((found >= 0) & (found < len(MOTIONS))).all())
-        chosen = MOTIONS[found] if numbered else found
         team, length = observations.shape[:2], 2 + memory.scenario.message_size
-        fits = chosen.ndim == 3 and chosen.shape[:2] == team and 2 <= chosen.shape[2] <= length
-        if numbered != self._discrete or not fits:
-            numbers = f"{team} of whole numbers from 0 to {len(MOTIONS) - 1}"
-            wanted = numbers if self._discrete else f"{(*team, length)}, or without the message"
-            raise PolicyError(
-                f"the function of policy {self.name!r} returned actions of shape {found.shape} "
-                f"({found.dtype}), wanted {wanted}"
-            )
+        shape = team if self._discrete else (*team, 2 if found.shape[-1:] == (2,) else length)
+        chosen = as_motions(f"what the function of policy {self.name!r} returned", found, shape, self._discrete)
         actions = np.zeros((*team, length), np.float32)
         actions[..., : chosen.shape[2]] = chosen
         return actions, memory
@@ -175,16 +167,10 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
 def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
     """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
 
-    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out. A tracker that is missing
-    is a ``PolicyError``.
+    Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
     """
-    names = [name for name in observations if name.startswith("tracker_")]
-    wanted = [f"tracker_{i}" for i in range(len(names))]
-    if not names or set(names) != set(wanted):
-        raise PolicyError(
-            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
-        )
-    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
+    count = sum(name.startswith("tracker_") for name in observations)
+    return np.stack([np.asarray(observations[f"tracker_{i}"], np.float32) for i in range(count)])[None]
 
 
 def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:

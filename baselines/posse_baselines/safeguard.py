@@ -12,7 +12,7 @@ evades.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -22,13 +22,12 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
 from posse import ObservationLayout
+from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import PolicyError, check_observations, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
-
-_MOST: Final = 1 + 1e-6  # numbers up to this are clipped, since rounding may exceed 1
 
 
 class Guard(Minds):
@@ -47,16 +46,11 @@ class Guard(Minds):
     def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
 
-        Call it once a control step, with its observations (E, R, F). ValueError if the shape is another, or a number
-        is not in [-1, 1].
+        Call it once a control step, with its observations (E, R, F). Longer velocities are shortened to the greatest
+        speed. ValueError if the shape is another.
         """
-        given = np.array(wanted, np.float32)
-        if given.ndim != 3 or given.shape[:2] != self.me.shape or given.shape[2] < 2:
-            raise ValueError(f"wanted velocities have shape {given.shape}, not {(*self.me.shape, 2)} or more")
-        allowed = np.abs(given) <= _MOST
-        if not allowed.all():
-            raise ValueError(f"a wanted velocity of {given[~allowed][0]} is not a number in [-1, 1]: scale it")
-        actions = np.ascontiguousarray(given.clip(-1, 1))
+        shape = (*self.me.shape, max(2, *np.shape(wanted)[-1:]))
+        actions = as_motions("the array of wanted velocities", wanted, shape, discrete=False).copy()
         self.run(guard_all, check_observations("safeguard", observations, self.me.shape, self.layout), actions)
         return actions
 
@@ -90,7 +84,6 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
         _check_continuous(env.action_space)
-        self._guard: Guard | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
@@ -101,8 +94,7 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Advance by one control step with wanted velocities."""
-        if self._guard is None:
-            return self.env.step(action)  # which refuses it
+        self.get_wrapper_attr("batch").check_running()
         motions = self._guard.actions(self._seen, self.get_wrapper_attr("actions_of")(action))
         observation, *rest = self.env.step(motions.reshape(self.action_space.shape or ()))
         self._seen = np.array(observation, ndmin=3)
@@ -116,7 +108,6 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
         super().__init__(env)
         for agent in env.possible_agents:
             _check_continuous(env.action_space(agent))
-        self._guard: Guard | None = None
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
@@ -126,9 +117,9 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        if self._guard is not None and self.env.agents:  # else the environment refuses the step
-            wanted = self.env.unwrapped.actions_of(actions)[:, : self._seen.shape[1]]
-            actions = {**actions, **split_agents(self._guard.actions(self._seen, wanted), actions)}
-        result: tuple[Any, Any, Any, Any, Any] = self.env.step(actions)
+        self.env.unwrapped.batch.check_running()
+        wanted = self.env.unwrapped.actions_of(actions)[:, : self._seen.shape[1]]
+        safe = split_agents(self._guard.actions(self._seen, wanted), actions)
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **safe})
         self._seen = stack_agents(result[0])
         return result

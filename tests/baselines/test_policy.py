@@ -8,7 +8,7 @@ from tests.support.adapters import out_of_band
 from tests.support.learned import policy_for
 
 import posse
-from posse_baselines import BasePolicy, Policy, PolicyError, begin, load, policy_names, rollout, stack_agents
+from posse_baselines import BasePolicy, Policy, PolicyError, begin, load, policy_names, rollout
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
 
@@ -189,8 +189,3 @@ def test_observations_of_another_shape_are_refused(name: str) -> None:
     memory = begin(policy, batch)
     with pytest.raises(PolicyError, match=r"shape \(2, 5, .*wanted \(3, 5, "):
         policy.act(batch.reset()[:2], memory)
-
-
-def test_a_team_with_a_gap_is_refused() -> None:
-    with pytest.raises(PolicyError, match="without a gap"):
-        stack_agents({"tracker_0": [0.0], "tracker_2": [0.0]})

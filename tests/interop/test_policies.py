@@ -84,5 +84,5 @@ def test_a_function_plays_as_a_policy() -> None:
 @pytest.mark.parametrize("shape", [(2, 5), (2, 5, 3), (5, 2), (2, 4, 2)])
 def test_a_function_of_another_shape_is_named(shape: tuple[int, ...]) -> None:
     policy = from_function(lambda observations: np.zeros(shape), name="wrong")
-    with pytest.raises(PolicyError, match="the function of policy 'wrong' returned actions"):
+    with pytest.raises(ValueError, match="what the function of policy 'wrong' returned has shape"):
         acted(policy)
