@@ -14,10 +14,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import Team, is_due, since
+from posse_baselines.ddcs.memory import Team, since
 from posse_baselines.ddcs.monitoring import target_after
 from posse_baselines.ddcs.settings import FLOCKING
 from posse_baselines.laws.geometry import clip, cross, dot, length, scaled, unit, vector
@@ -33,11 +31,8 @@ from posse_baselines.laws.safeguard import (
     to_wall,
     turn_past,
 )
-from posse_baselines.laws.steering import slot_velocity
 
-_SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
 _EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
-_TAKEN_TIME: Final = 3.0  # s; longest time for which a slot counts as taken after an echo from it
 _MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
 _SIDE_KEPT: Final = 1.5  # s
 
@@ -70,24 +65,6 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
 
 
 @compiled
-def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
-    """Return the slot whose occupant would give this echo, or -1.
-
-    Where not all team-mates have a place in the observation and there are no obstacles, an echo from a slot is
-    attributed to one of them, moving with the formation.
-    """
-    for k in range(len(team.slots)):
-        arm = team.slots[k] * me.frame
-        velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
-        way = me.target + arm - me.position - scaled(velocity, team.world.lead) + me.moved
-        distance = length(way)
-        fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
-        if fits and dot(way, beam) >= team.world.wide_beam * distance:
-            return k
-    return -1
-
-
-@compiled
 def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
     """List the discs that will be near when the command is executed; return their number."""
     at, world, settings = team.at, team.world, team.settings
@@ -113,26 +90,17 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
             count = put_near(discs, count, way, velocity, two, margin)
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
-    strangers = me.known != 0 and world.strangers != 0
-    if not strangers or is_due(team, me, _TAKEN_TIME):
-        me.taken = np.uint64(0)
     heading = me.heading * me.turned.conjugate()
+    course = complex(me.target_velocity) if me.known and world.strangers else 0j  # a team-mate moves with the target
     for k in range(at.sonar_beams):
         reading = float(row[at.sonar + k])
         beam = team.beams[k] * heading
         if reading >= world.sonar_range - _EXPLAINED or is_explained(team, me, discs[:robots], beam, reading):
             continue
-        slot = slot_in_beam(team, me, beam, reading) if strangers else -1
-        if slot >= 0:
-            me.taken |= np.uint64(1) << np.uint64(slot)
-            arm = team.slots[slot] * me.frame
-            velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
-            count = put_disc(discs, count, me.target + arm - me.position, velocity, two, settings.margin)
-        else:
-            # Its position within the beam is unknown: a disc that fills most of the beam.
-            wide = min(0.5, 0.4 * (reading + radius))
-            place = scaled(beam, reading + radius + wide) - me.moved
-            count = put_disc(discs, count, place, 0j, wide + radius, settings.echo_margin)
+        # Its position within the beam is unknown: a disc that fills most of the beam.
+        wide = min(0.5, 0.4 * (reading + radius))
+        place = scaled(beam, reading + radius + wide) - me.moved
+        count = put_disc(discs, count, place, course, wide + radius, settings.echo_margin)
     return count
 
 

@@ -24,7 +24,7 @@ from posse.rules import beam_directions
 from posse.scenarios.scenario import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY
-from posse_baselines.laws.steering import Work, work_for
+from posse_baselines.laws.steering import Work, work_for, work_of
 
 Kernel = Callable[..., None]
 _F, _I, _C = np.float32, np.int32, np.complex64
@@ -89,7 +89,7 @@ def constants_of(scenario: Scenario) -> Records:
         sight=_F(sight),  # how far its target sensor reaches, m
         # 1: more team-mates than places in an observation
         unlisted=_I(unlisted),
-        # 1: what the sonar detects in a slot is a team-mate without a place: there are no obstacles
+        # 1: what the sonar alone detects is a team-mate without a place: there are no obstacles
         strangers=_I(unlisted and scenario.num_obstacles == 0),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
         inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m
@@ -177,7 +177,6 @@ MIND: Final = record(
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none
-    taken=np.uint64(0),  # bit set of slots in which the sonar detected a robot not heard
     closing=_I(0),  # 1: the law itself, not the safeguard, keeps the range to the target
     side=_I(0),  # of the last detour: 1 left, -1 right
     side_step=_I(0),  # own step of that detour
@@ -280,7 +279,7 @@ def for_each(function: Kernel) -> Kernel:
     def run(minds: Any, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
         shared, me, mates = minds
         team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
-        work = Work(works.cost[thread], works.assigning[thread], works.discs[thread])
+        work = work_of(works, thread)
         for e in range(first, end):
             for i in range(rows.shape[1]):
                 function(team, me[e, i], mates[e, i], rows[e, i], work, out[e, i])

@@ -21,8 +21,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer
@@ -36,10 +34,8 @@ _IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
 _IN_SIGHT: Final = 0.95  # share of the range of sight within which a slot counts as seeing the target
 _SIGHT_WORTH: Final = 10.0  # s; bonus of such a slot, as arrival time
 _LOYALTY: Final = 0.6  # s; least gain in total arrival time for a change of slots
-_TAKEN_COST: Final = 8.0  # s; cost of a slot in which the sonar detects a robot that is not heard
 _RESERVED: Final = 1e4  # s; cost of a slot claimed by another
 _HALF_TURN: Final = 0.25 * math.pi  # of the turning time, per 1 - cos
-_BIT: Final = np.uint64(1)
 
 
 @compiled
@@ -156,8 +152,6 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             time = slot_cost(team, me, mate.place, heading, k)
             if held == k:
                 time -= _LOYALTY
-            if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
-                time += _TAKEN_COST
             # The leader of the centralized model takes the first slot.
             if settings.centralized and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
