@@ -68,6 +68,8 @@ class Known(NamedTuple):
     """Offsets of an observation's fields, an array of one record."""
     slots: Places
     """(N,) in the slot frame, m."""
+    half: complex
+    """Half the width and half the height of the arena, m; infinite on the open plane."""
     first: bool
     """Whether of more slots than robots the first is filled at any rate."""
     share: np.float32
@@ -89,7 +91,7 @@ def write_features(row: FloatArray, known: Known, estimate: Record, places: Plac
     if row[f.target_known] <= 0.0:
         estimate.age = -ONE
         # As if the own slot were far away in the direction to explore in.
-        way = _explore(row, f, places[1:count])
+        way = _explore(row, known, places[1:count])
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
@@ -100,7 +102,7 @@ def write_features(row: FloatArray, known: Known, estimate: Record, places: Plac
     frame *= turn
     for s in range(len(slots)):
         place = target + slots[s] * frame
-        more = _OUTSIDE if _is_outside(row, f, place) else ZERO
+        more = _OUTSIDE if _is_outside(row, known, place) else ZERO
         if s == 0 and known.first and working < count:
             more -= _FIRST
         for j in range(working):
@@ -167,31 +169,22 @@ def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64],
 
 
 @compiled
-def _explore(row: FloatArray, f: Record, mates: Places) -> complex:
+def _explore(row: FloatArray, known: Known, mates: Places) -> complex:
     """Return the direction in which a tracker explores: ahead, away from team-mates and from walls."""
-    way = complex(1.0, 0.0)
+    f, half, way = known.at[0], known.half, complex(1.0, 0.0)
     for j in range(len(mates)):
         way += push_from(mates[j], _SPREAD)
-    if row[f.arena] > 0.0:
-        place, x, y = pair(row, f.position), 0.25 * row[f.arena], 0.25 * _height(row, f)
-        inwards = complex(push_inwards(place.real, x), push_inwards(place.imag, y))
-        way += inwards * pair(row, f.heading).conjugate()
-    return _soft(way, _SMALL)
+    place = pair(row, f.position)
+    inwards = complex(push_inwards(place.real, 0.5 * half.real), push_inwards(place.imag, 0.5 * half.imag))
+    return _soft(way + inwards * pair(row, f.heading).conjugate(), _SMALL)
 
 
 @compiled
-def _is_outside(row: FloatArray, f: Record, place: complex) -> bool:
+def _is_outside(row: FloatArray, known: Known, place: complex) -> bool:
     """Return whether a robot at a place would touch a wall."""
-    if row[f.arena] <= 0.0:
-        return False
+    f, half = known.at[0], known.half
     at, radius = pair(row, f.position) + place * pair(row, f.heading), row[f.robot_radius]
-    return bool(abs(at.real) > 0.5 * row[f.arena] - radius or abs(at.imag) > 0.5 * _height(row, f) - radius)
-
-
-@compiled
-def _height(row: FloatArray, f: Record) -> Any:
-    """Return the height (m) of a walled arena; a square's observation has one side alone."""
-    return row[f.arena_height] if f.arena_height >= 0 else row[f.arena]
+    return bool(abs(at.real) > half.real - radius or abs(at.imag) > half.imag - radius)
 
 
 @compiled

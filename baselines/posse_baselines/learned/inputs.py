@@ -24,8 +24,6 @@ from posse_baselines.policy import PolicyError, check_observations
 
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
-MOST_NEIGHBOURS: Final = 4096
-"""Team-mates that an encoding reads, at most."""
 _SHARE: Final = 0.25  # of a new fix in the estimate of the target, where fixes are noisy
 _HARDLY: Final = 1e-3  # probability
 _RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
@@ -58,11 +56,6 @@ class Encoding:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise PolicyError(f"unknown encoding {self.kind!r:.80}; encodings are: {', '.join(KINDS)}")
-        if not 0 <= self.neighbours <= MOST_NEIGHBOURS:
-            raise PolicyError(f"neighbours={self.neighbours} must lie in [0, {MOST_NEIGHBOURS}]")
-        for field in self.fields:
-            if field.size < 1 or not math.isfinite(field.unknown):
-                raise PolicyError(f"the field {field!r:.200} must have a size above 0 and a finite value for unknown")
 
     @classmethod
     def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
@@ -167,7 +160,8 @@ class Encoder(OwnArrays):
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
         noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
         share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(_patience(layout.scenario))
-        self._for_features = Known(offsets_of(layout), slots, first, share, patience), *work
+        half = complex(*layout.scenario.half_sides)
+        self._for_features = Known(offsets_of(layout), slots, half, first, share, patience), *work
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""

@@ -43,7 +43,6 @@ _KEY: Final = "posse-policy"
 class _Memory(NamedTuple):
     """What a learned policy remembers of its worlds."""
 
-    layout: ObservationLayout
     encoder: Encoder
     minds: Any
     """Of the adviser, or the :class:`~posse_baselines.safeguard.Guard`; ``None``: of neither."""
@@ -106,12 +105,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         )
         self.safeguard = safeguard
         self._layers = network.layers()
-        if not isinstance(card, Mapping):
-            raise PolicyError(f"its card must be a mapping of names to values, not {card!r:.80}")
         name, side = card.get("name", "learned"), card.get("side", "trackers")
         splits = card.get("trained_splits", ("train",))
-        if not isinstance(name, str) or not name:
-            raise PolicyError(f"the name on its card, {name!r:.80}, must be a text")
         if side not in SIDES:
             raise PolicyError(f"side={side!r:.80} on its card must be {' or '.join(SIDES)}")
         if not isinstance(splits, (list, tuple)) or any(split not in SPLITS for split in splits):
@@ -129,7 +124,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         if self.adviser is not None:  # it has a safeguard of its own
             minds = self.adviser.begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        return _Memory(layout, Encoder(self.encoding, layout, num_worlds, robots), minds)
+        return _Memory(Encoder(self.encoding, layout, num_worlds, robots), minds)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -137,7 +132,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         One that moves the target takes (E, 1, F).
         """
         m: _Memory = memory
-        observations = check_observations(self.name, observations, m.encoder.estimates.shape, m.layout)
+        observations = check_observations(self.name, observations, m.encoder.estimates.shape, m.encoder.layout)
         inputs = m.encoder.encode(observations)
         if self.adviser is not None:
             proposals, _ = self.adviser.propose(observations, m.minds)
@@ -145,7 +140,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         outputs = self._forward(inputs).reshape(*observations.shape[:2], -1)
         if self.adviser is not None:
             return self.adviser.carry_out(observations, m.minds, _REACH * outputs)[0], m
-        actions = np.zeros((*outputs.shape[:2], MOTION + m.layout.scenario.message_size), np.float32)
+        actions = np.zeros((*outputs.shape[:2], MOTION + m.encoder.layout.scenario.message_size), np.float32)
         actions[..., : outputs.shape[2]] = outputs
         return m.minds.actions(observations, actions) if self.safeguard else actions, m
 
