@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, record_type
+from posse.numeric import BoolArray, FloatArray, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
@@ -82,19 +82,22 @@ def believed(scenario: Scenario) -> Scenario:
     )
 
 
-class Beliefs(OwnArrays):
-    """The belief worlds of E teams of N trackers, R = E N, and the search for the best way to play in them.
+class Beliefs(Minds):
+    """The memory of E teams of N trackers, R = E N: a belief world of each, and the search for the best way in them.
 
     Args:
-        settings: How it plans; ``None``: by default.
         layout: Of the observations.
+        settings: By which they monitor and search.
         num_worlds: E.
+        plans: How they plan; ``None``: by default.
     """
 
-    def __init__(self, settings: PlannerSettings | None, layout: ObservationLayout, num_worlds: int) -> None:
+    def __init__(
+        self, layout: ObservationLayout, settings: Settings, num_worlds: int, plans: PlannerSettings | None
+    ) -> None:
         scenario = layout.scenario
-        self.layout, self.dt = layout, scenario.control_step
-        self.rows = num_worlds * scenario.num_trackers
+        super().__init__(layout, settings, num_worlds, scenario.num_trackers)
+        self.dt, self.rows = scenario.control_step, num_worlds * scenario.num_trackers
         self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
         window = 2 * scenario.radio_delay + 2 if self.late else 0
@@ -119,13 +122,15 @@ class Beliefs(OwnArrays):
             np.zeros((window + 1, *self.now.action_shape), np.float32),
         )
         # With more rounds, plans of trackers that know different things differ more: 0.01 to 0.02 less on radio.
-        self.search = Search(settings or PlannerSettings(rounds=2 if self.late else 4), self.now)
+        self.search = Search(plans or PlannerSettings(rounds=2 if self.late else 4), self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
         self.search.teams.late[:] = _UNSEEN_DELAY * (np.array(arms) > scenario.sensing_range)
-        self.restart(np.ones(self.rows, np.bool_))
+        self.restart(np.ones(num_worlds, np.bool_))
 
     def restart(self, mask: BoolArray) -> None:
-        """Forget the rows of a mask (R,)."""
+        """Forget all in the worlds of a mask (E,)."""
+        super().restart(mask)
+        mask = np.repeat(mask, self.me.shape[1])
         for mine, start in zip(self._past, self._start, strict=True):
             mine[mask] = start
         limit = self.now.scenario.target_turn_rate**2
@@ -134,12 +139,9 @@ class Beliefs(OwnArrays):
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
 
-    def act(self, observations: FloatArray, mates: Records) -> FloatArray:
-        """Bring the worlds up to the present; return the action of each tracker in its own, (R, 2).
-
-        Observations are (E, N, F); ``mates`` (R, N) is what each tracker knows of the others.
-        """
-        worlds, rows = self.now.arrays, np.arange(self.rows)
+    def plan(self, observations: FloatArray) -> FloatArray:
+        """Bring the worlds up to the present by observations (E, N, F); return each tracker's own action, (R, 2)."""
+        worlds, rows, mates = self.now.arrays, np.arange(self.rows), self.mates.reshape(self.rows, -1)
         own = self.layout.views(observations)["number"].astype(np.int64).reshape(-1)
         working = mates["there"] != 0
         working[rows, own] = True
@@ -159,6 +161,10 @@ class Beliefs(OwnArrays):
         self._told.played[-1] = actions
         self.step += 1
         return actions[rows, own, :2]
+
+    def planned(self) -> BoolArray:
+        """Return whether each tracker plays what it planned, (E, N)."""
+        return np.asarray(self.age.reshape(self.me.shape) * self.dt <= _LOST_AFTER)
 
     def _advance(self, seen: Records, moment: int) -> None:
         """Write what was told of a moment, and step the worlds from there."""
@@ -286,20 +292,6 @@ def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     return np.asarray(np.angle(np.exp(1j * angle)))
 
 
-class _Memory(Minds):
-    """Of the trackers as they monitor and search, and what they believe."""
-
-    def __init__(
-        self, plans: PlannerSettings | None, layout: ObservationLayout, settings: Settings, num_worlds: int
-    ) -> None:
-        super().__init__(layout, settings, num_worlds, layout.scenario.num_trackers)
-        self.beliefs = Beliefs(plans, layout, num_worlds)
-
-    def restart(self, mask: BoolArray) -> None:
-        super().restart(mask)
-        self.beliefs.restart(np.repeat(mask, self.me.shape[1]))
-
-
 class BeliefPlanner(DDCS):
     """Model-predictive control in a world that each tracker keeps from what it observes and is told.
 
@@ -321,20 +313,18 @@ class BeliefPlanner(DDCS):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode; PolicyError as for :class:`DDCS`."""
         super().begin(layout, num_worlds)
-        return _Memory(self.plans, layout, self.settings_for(layout.scenario), num_worlds)
+        return Beliefs(layout, self.settings_for(layout.scenario), num_worlds, self.plans)
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
         proposals, memory = super().propose(observations, memory)
-        me, mates, beliefs = memory.me, memory.mates, memory.beliefs
-        shape = me.shape
-        plans = beliefs.search.teams.plans.reshape(mates.shape)
-        if beliefs.late:  # where trackers know different things, they keep to what they tell each other
+        me, mates = memory.me, memory.mates
+        plans = memory.search.teams.plans.reshape(mates.shape)
+        if memory.late:  # where trackers know different things, they keep to what they tell each other
             claimed = mates["slot"] >= 0
             plans["slot"][claimed] = mates["slot"][claimed]
-        by_row = mates.reshape(-1, mates.shape[-1])
-        actions = beliefs.act(np.asarray(observations, np.float32), by_row).reshape(*shape, 2)
-        planned = self._planned(memory)
+        actions = memory.plan(np.asarray(observations, np.float32)).reshape(*me.shape, 2)
+        planned = memory.planned()
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.
         followed = memory.team.world["followed"][0]
@@ -350,14 +340,8 @@ class BeliefPlanner(DDCS):
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return those of the DDCS, with the ``estimate`` as believed where the planned motion is played."""
-        notes, beliefs = super().annotations(memory), memory.beliefs
-        world, planned = beliefs.now.worlds, self._planned(memory)
+        notes, world, planned = super().annotations(memory), memory.now.worlds, memory.planned()
         theta = np.arctan2(world["heading_sin"], world["heading_cos"])
         estimate = np.stack([world["x"], world["y"], theta], axis=-1).reshape(*planned.shape, 3)
         notes["estimate"] = np.where(planned[..., None], estimate, notes["estimate"])
         return notes
-
-    def _planned(self, memory: Memory) -> BoolArray:
-        """Return whether each tracker plays what it planned, (E, N)."""
-        beliefs = memory.beliefs
-        return np.asarray(beliefs.age.reshape(memory.me.shape) * beliefs.dt <= _LOST_AFTER)
