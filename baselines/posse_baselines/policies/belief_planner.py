@@ -34,16 +34,10 @@ _AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that 
 _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
-_APART: Final = 10  # control steps between two turn rates from which a weave is told
-_USUAL: Final = math.cos(0.5 * 0.1 * _APART)  # of a weave of 0.5 rad/s
-_KEPT: Final = 0.99  # share of what was learned of a weave that is kept in a step
 
 _SEEN: Final = record_type(
     ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
     ("theta", np.float64),  # heading then, rad
-    ("turns", np.float64, (2 * _APART + 1,)),  # turn rates of the last steps before it, rad/s; NaN: not measured
-    ("product", np.float64),  # of a turn rate with the mean of those before and after it, summed
-    ("square", np.float64),  # of the former, summed: the ratio is the cosine of what a weave goes on in that time
 )
 
 
@@ -63,10 +57,15 @@ class _Told(NamedTuple):
 
 
 def believed(scenario: Scenario) -> Scenario:
-    """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
+    """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails.
+
+    A target that weaves is taken to drive straight on from its last heading.
+    """
     near, far = scenario.start_distance
+    motion = scenario.target_motion
     return scenario.replace(
         start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # no start is played
+        target_motion="constant" if motion == "accelerating" else motion,
         sensor="range-bearing",
         sonar_beams=0,
         num_neighbours=0,
@@ -133,8 +132,7 @@ class Beliefs(Minds):
         mask = np.repeat(mask, self.me.shape[1])
         for mine, start in zip(self._past, self._start, strict=True):
             mine[mask] = start
-        limit = self.now.scenario.target_turn_rate**2
-        self._seen[mask] = (-NEVER, 0.0, np.full(2 * _APART + 1, np.nan), _USUAL * limit, limit)
+        self._seen[mask] = (-NEVER, 0.0)
         self.step[mask], self.newest[mask], self.age[mask] = 0, -1, NEVER
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
@@ -243,40 +241,12 @@ class Beliefs(Minds):
             w["pressed"][wrong & ~turning & (pressed < 0.9 * dart)] = PATIENCE - 0.5
         else:
             goal = np.where(first | (np.abs(surprise) > 10 * _AGREES), theta, goal * np.exp(1j * surprise))
-        if s.target_motion == "accelerating":
-            self._tell_weave(seen, here, gap, turn)
         w["x"][here], w["y"][here], w["speed"][here], w["turn_rate"][here] = (
             value[here] for value in (place.real, place.imag, speed, turn)
         )
         for name, direction in (("heading", theta), ("frame", frame), ("goal", goal)):
             w[f"{name}_cos"][here], w[f"{name}_sin"][here] = direction.real[here], direction.imag[here]
         seen["step"][here], seen["theta"][here] = w["step"][here], angle[here]
-
-    def _tell_weave(self, seen: Records, here: BoolArray, gap: FloatArray, turn: FloatArray) -> None:
-        """Write the weave of a target that turned at a rate (R,) since its last fix, a gap (R,) in s ago.
-
-        Of a sine, the mean of the values a time before and after is the value times the cosine of what passes of it.
-        """
-        w, limit = self.now.arrays.world, self.now.scenario.target_turn_rate
-        weaves = (gap <= _GAP) & (np.abs(turn) < 0.95 * limit)  # else it turns from a wall
-        steps = np.clip(np.rint(gap / self.dt), 0, 2 * _APART + 1).astype(np.int64)
-        longer = np.concatenate(
-            [np.repeat(np.where(weaves, turn, np.nan)[:, None], 2 * _APART + 1, axis=1), seen["turns"]], axis=1
-        )
-        turns = np.take_along_axis(longer, np.arange(2 * _APART + 1) + (2 * _APART + 1 - steps)[:, None], axis=1)
-        late, middle, early = turns[:, 0], turns[:, _APART], turns[:, -1]
-        new = here & np.isfinite(late + middle + early)
-        kept = _KEPT**steps
-        for name, value in (("product", 0.5 * (late + early) * middle), ("square", middle * middle)):
-            seen[name][new] = (kept * seen[name] + value)[new]
-        seen["turns"][here] = turns[here]
-        passes = np.arccos(np.clip(seen["product"] / seen["square"], *np.cos(self.dt * _APART * np.array((0.8, 0.2)))))
-        middle = np.where(np.isfinite(middle), middle, late * np.cos(passes))
-        wave = (late * np.cos(passes) - middle) / np.sin(passes) + 1j * late
-        told, rate = here & np.isfinite(wave), passes / (self.dt * _APART)
-        w["weave_amplitude"][told] = np.clip(np.abs(wave), 0.4 * limit, 0.9 * limit)[told]
-        w["weave_rate"][told] = rate[told]
-        w["weave_phase"][told] = ((np.angle(wave) + rate * self.dt) % (2.0 * math.pi))[told]
 
 
 def _complex(pairs: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
