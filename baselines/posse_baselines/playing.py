@@ -201,8 +201,7 @@ def batch_for(
         settings: Further arguments of :func:`posse.batch`.
 
     Raises:
-        PolicyError: The target is an agent that nothing moves, or the policy plans ahead in copies of the worlds, which
-            have no target's policy.
+        PolicyError: The policy plans ahead in copies of the worlds, which have no target's policy.
     """
     moved = None if target is None else target.policy
     if moved is not None and policy.reads_state:
@@ -213,18 +212,7 @@ def batch_for(
     size = max(scenario.message_size, policy.message_size)
     motion = scenario.target_motion if target is None else target.motion
     scenario = scenario.replace(message_size=size, target_motion=motion)
-    batch = posse.batch(scenario, num_worlds, target_policy=moved, **settings)
-    _check_target_moves(policy, batch)
-    return batch
-
-
-def _check_target_moves(policy: Policy, batch: Batch) -> None:
-    """Raise if the target is an agent and no policy in the batch moves it."""
-    if batch.scenario.num_agents != batch.scenario.num_trackers and not isinstance(batch, PairedBatch):
-        raise PolicyError(
-            f"the target of {batch.scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give "
-            "a target too, target=, or play it with posse play"
-        )
+    return posse.batch(scenario, num_worlds, target_policy=moved, **settings)
 
 
 def rollout(
@@ -256,7 +244,11 @@ def rollout(
     """
     if steps is not None and (steps < 1 or steps != int(steps)):
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
-    _check_target_moves(policy, batch)
+    if batch.scenario.target_is_agent and not isinstance(batch, PairedBatch):
+        raise PolicyError(
+            f"the target of {batch.scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give "
+            "a target too, target=, or play it with posse play"
+        )
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)

@@ -71,7 +71,7 @@ def read_tuned(path: Path) -> TunedDDCS:
         for name in values:
             if name not in known:
                 raise ValueError(unknown(f"tunable setting of {policy}", name, known))
-        settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
+        team = DDCS(FAMILY[policy]).with_settings(**{name: float(value) for name, value in values.items()})
     except (OSError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise PolicyError(f"{path} holds no tuned settings: {type(error).__name__}: {error!s:.1000}") from error
-    return TunedDDCS(f"{policy}-tuned-{scenario}", settings, card)
+    return TunedDDCS(f"{policy}-tuned-{scenario}", team.settings, card)

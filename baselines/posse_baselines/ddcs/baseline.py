@@ -27,6 +27,7 @@ others take slots by least total time (:mod:`~posse_baselines.ddcs.roles`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -59,7 +60,7 @@ FAMILY: Final[dict[str, Settings]] = {
     "pngl-l-phi": BASELINE,
     # As printed: c = 0, and φ from the leader's heading. The leader then follows from any side and the wedge turns with
     # it, so that only a target that drives straight ahead is held.
-    "pngl-l-phi-literal": BASELINE.replace(deviation="none", follower_frame="leader"),
+    "pngl-l-phi-literal": replace(BASELINE, deviation="none", follower_frame="leader"),
     "pngl": Settings(guidance="pngl", spread=0.1),
     "deviated-pursuit": Settings(guidance="pngl"),
     "velocity-pursuit": Settings(guidance="pngl", deviation="none"),
@@ -93,7 +94,7 @@ class DDCS(BasePolicy):
 
     def with_settings(self, **values: Any) -> DDCS:
         """Return a policy with some settings changed; ValueError if a value is out of its range."""
-        return DDCS(self.settings.replace(**values), self.name)
+        return DDCS(replace(self.settings, **values), self.name)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start; PolicyError if the scenario does not fit."""

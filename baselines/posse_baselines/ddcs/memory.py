@@ -92,8 +92,8 @@ def constants_of(scenario: Scenario) -> Records:
         # 1: what the sonar alone detects is a team-mate without a place: there are no obstacles
         strangers=_I(unlisted and scenario.num_obstacles == 0),
         drifts=_I(scenario.drifts),  # 1: each robot's own pose, as it knows it, drifts
-        inner_x=_F(_inner(half_width, sight)),  # half the width of the area that robots explore freely, m
-        inner_y=_F(_inner(half_height, sight)),  # half its height
+        # half the width and half the height of the area that robots explore freely, m
+        inner=_C(complex(_inner(half_width, sight), _inner(half_height, sight))),
         # rad/s, to either side, of a target that is an agent and may turn at any time
         target_turns=scenario.target_turn_rate if scenario.target_is_agent else 0.0,
         outermost=max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m

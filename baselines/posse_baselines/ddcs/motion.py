@@ -278,8 +278,7 @@ def explore(team: Team, me: Record, mates: Records) -> complex:
     """
     world, settings = team.world, team.settings
     off = me.position - (me.target if world.walled == 0 and me.fix_step >= 0 else 0j)
-    way = complex(push_inwards(off.real, world.inner_x), push_inwards(off.imag, world.inner_y))
-    way = me.heading + scaled(way, _BORDER)
+    way = me.heading + scaled(push_inwards(off, world.inner), _BORDER)
     for j in range(len(mates)):
         if mates[j].there:
             way += push_from(mates[j].place - me.position, settings.apart)

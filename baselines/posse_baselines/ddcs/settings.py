@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from posse_baselines.fields import check, number, tuned
 
@@ -119,7 +118,3 @@ class Settings:
         for transition in self.forbidden:
             if transition not in TRANSITIONS:
                 raise ValueError(f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}")
-
-    def replace(self, **overrides: Any) -> Settings:
-        """Return a copy with some settings changed."""
-        return dataclasses.replace(self, **overrides)

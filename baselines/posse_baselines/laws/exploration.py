@@ -23,7 +23,11 @@ def push_from(mate: complex, strength: float) -> complex:
 
 
 @compiled
-def push_inwards(x: float, start: float) -> float:
-    """Return the push towards the middle at ``x`` (m) from it: 0 up to ``start``, then 0.5 more a metre, 1 at most."""
-    push = min(max(0.5 * (abs(x) - start), 0.0), 1.0)
-    return -push if x > 0.0 else push
+def push_inwards(place: complex, start: complex) -> complex:
+    """Return the push to the middle along x and y at a place (m) from it, by their distances from the middle (m).
+
+    It is 0 up to ``start``, then 0.5 more a metre, 1 at most.
+    """
+    x = min(max(0.5 * (abs(place.real) - start.real), 0.0), 1.0)
+    y = min(max(0.5 * (abs(place.imag) - start.imag), 0.0), 1.0)
+    return complex(-x if place.real > 0.0 else x, -y if place.imag > 0.0 else y)

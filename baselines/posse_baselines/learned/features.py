@@ -171,11 +171,10 @@ def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64],
 @compiled
 def _explore(row: FloatArray, known: Known, mates: Places) -> complex:
     """Return the direction in which a tracker explores: ahead, away from team-mates and from walls."""
-    f, half, way = known.at[0], known.half, complex(1.0, 0.0)
+    f, way = known.at[0], complex(1.0, 0.0)
     for j in range(len(mates)):
         way += push_from(mates[j], _SPREAD)
-    place = pair(row, f.position)
-    inwards = complex(push_inwards(place.real, 0.5 * half.real), push_inwards(place.imag, 0.5 * half.imag))
+    inwards = push_inwards(pair(row, f.position), scaled(known.half, 0.5))
     return _soft(way + inwards * pair(row, f.heading).conjugate(), _SMALL)
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
-from posse_baselines.fields import check, number
-from posse_baselines.policies.planner_law import PLAN, WAY, Teams, drive, teams_of
+from posse.rules import config_record, slot_records
+from posse_baselines.laws.steering import work_for
+from posse_baselines.policies.planner_law import PLAN, WAY, Teams, drive
 from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
@@ -36,24 +36,15 @@ _SPREAD: Final = 0.2  # standard deviation of a change, as a share of the range
 _SEED: Final = 0  # of the variations and of what copies draw
 
 
-@dataclass(frozen=True, kw_only=True)
-class PlannerSettings:
-    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata."""
+class PlannerSettings(NamedTuple):
+    """How far the planner looks ahead, and what it tries."""
 
-    look_ahead: float = number(4.0, "s", 0.1, 20.0)
-    """How far each try is played ahead."""
-    keep: float = number(0.5, "s", 0.01, 20.0)
-    """How long the best is kept before the next planning."""
-    rounds: int = number(4, "", 0, 20)
+    look_ahead: float = 4.0
+    """How far each try is played ahead, s."""
+    keep: float = 0.5
+    """How long the best is kept before the next planning, s; at most ``look_ahead``."""
+    rounds: int = 4
     """Rounds of variations on the best so far, after the standard ways of playing."""
-
-    def __post_init__(self) -> None:
-        check(self)
-        if self.keep > self.look_ahead:
-            raise ValueError(
-                f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "
-                "after it was not played ahead"
-            )
 
 
 class Search(OwnArrays):
@@ -71,14 +62,22 @@ class Search(OwnArrays):
         self.settings, self.batch = settings, batch
         dt, n = batch.scenario.control_step, batch.scenario.num_trackers
         self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))
-        self.teams = teams_of(batch.scenario, np.full((batch.num_worlds, n), _STANDARD[0]))
+        shape, slots = (batch.num_worlds, n), [complex(slot.x, slot.y) for slot in slot_records(batch.scenario)]
+        self.teams = Teams(
+            config=config_record(batch.scenario),
+            slots=np.array(slots, np.complex64),
+            ways=np.full(shape, _STANDARD[0]),
+            plans=np.full(shape, PLAN),
+            late=np.zeros(n, np.float32),
+            work=work_for(n),
+        )
         self._copies: Batch | None = None
         self._later: Batch | None = None
         # Variations are drawn once, so that what is tried in a world does not depend on the others.
         rng = np.random.default_rng(_SEED)
-        shape = (_REPEAT, settings.rounds, _TRIES - 1, n)
-        self._changed = rng.random(shape) < _VARIED
-        self._shifts = {name: _SPREAD * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()}
+        each = (_REPEAT, settings.rounds, _TRIES - 1, n)
+        self._changed = rng.random(each) < _VARIED
+        self._shifts = {name: _SPREAD * (high - low) * rng.normal(size=each) for name, (low, high) in _RANGES.items()}
 
     def restart(self, mask: BoolArray) -> None:
         """Forget what was planned for the worlds of a mask (E,)."""

@@ -12,9 +12,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, Scenario
+from posse import Batch
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
-from posse.rules import NEVER, config_record, slot_records
+from posse.rules import NEVER
 from posse_baselines.ddcs.memory import record
 from posse_baselines.laws.geometry import angle_of, dot, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
@@ -26,7 +26,6 @@ from posse_baselines.laws.steering import (
     intercept_time,
     slot_velocity,
     way_round,
-    work_for,
     work_of,
 )
 
@@ -52,7 +51,7 @@ PLAN: Final = record(
 
 
 class Teams(NamedTuple):
-    """What the law knows of the teams in E worlds beside the state of these; made by :func:`teams_of`."""
+    """What the law knows of the teams in E worlds beside the state of these."""
 
     config: Records
     """(1,) the scenario as kernels read it."""
@@ -65,14 +64,6 @@ class Teams(NamedTuple):
     late: FloatArray
     """(N,) s; by how much a slot is taken to be reached later than it is, so that others are filled before it."""
     work: Work
-
-
-def teams_of(scenario: Scenario, ways: Records) -> Teams:
-    """Return teams that play ways (E, N) and have no slots yet."""
-    n = ways.shape[1]
-    plans, late = np.full(ways.shape, PLAN), np.zeros(n, np.float32)
-    slots = np.array([complex(slot.x, slot.y) for slot in slot_records(scenario)], np.complex64)
-    return Teams(config_record(scenario), slots, ways, plans, late, work_for(n))
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
