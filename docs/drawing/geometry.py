@@ -116,30 +116,6 @@ def l_phi(axes: Axes) -> None:
     _frame(axes, [leader, follower, (3.3, 1.8), (0.1, 0.0)])
 
 
-def l_l(axes: Axes) -> None:
-    """Draw the two distances that a follower keeps from two robots."""
-    first, second = (3.1, 1.5), (1.0, 2.5)
-    point, own = (0.95, 0.4), 0.35
-    follower = ahead(point, own + math.pi, 0.6)
-    line(axes, first, point, "l_i")
-    line(axes, point, second, "l_k")
-    line(axes, follower, point, style="-")
-    angle(
-        axes,
-        point,
-        math.atan2(first[1] - point[1], first[0] - point[0]),
-        math.atan2(second[1] - point[1], second[0] - point[0]),
-        0.55,
-        "",
-    )
-    _note(axes, (point[0] + 0.95, point[1] + 0.75), "γ_k - γ_i")
-    axes.plot(*point, "o", ms=5, color=TRACKER, zorder=6)
-    robot(axes, follower, own, TRACKER, "follower j", 1.25)
-    robot(axes, first, 0.4, OTHER, "leader i")
-    robot(axes, second, 0.4, OTHER, "robot k")
-    _frame(axes, [first, second, follower, (3.5, 2.2)])
-
-
 def slot_law(axes: Axes) -> None:
     """Draw the slot's velocity, the gain on the offset, and their sum."""
     tracker, slot = (0.0, 0.0), (2.2, 0.9)

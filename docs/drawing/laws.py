@@ -47,7 +47,6 @@ LAWS: Final = (
     Law("deviated-pursuit", "deviated-pursuit", lambda axes: geometry.pursuit(axes, deviated=True), "slot"),
     Law("pngl", "pngl", geometry.navigation, "slot"),
     Law("l-phi", "pngl-l-phi", geometry.l_phi, "slot"),
-    Law("l-l", "ddcs-centralized-l-l", geometry.l_l, "slot"),
     Law("slot", "ddcs-distributed", geometry.slot_law, "slot"),
 )
 

@@ -49,7 +49,6 @@ BASELINE: Final = Settings(
     guidance="pngl",
     navigation_constant=1.1,  # K, at the upper end of the paper's range
     deviation="occupant",  # c = the heading of the slot's occupant - K σ_d, so that the leader holds its slot
-    follower_law="l-phi",
     follower_frame="slot-frame",  # φ_d is constant in the slot frame, not in the leader's: the wedge stays behind
 )
 """The settings of PNGL + l-φ; the others keep their defaults (:class:`~posse_baselines.ddcs.settings.Settings`)."""
@@ -67,7 +66,6 @@ FAMILY: Final[dict[str, Settings]] = {
     "ddcs-centralized-pursuit": Settings(guidance="pngl", deviation="none", **_CENTRALIZED),
     "ddcs-distributed": Settings(),
     "ddcs-centralized": Settings(**_CENTRALIZED),
-    "ddcs-centralized-l-l": Settings(follower_law="l-l", **_CENTRALIZED),
     "ddcs-centralized-no-exchange": Settings(forbidden=NO_EXCHANGE, **_CENTRALIZED),
     "ddcs-no-radio": Settings(radio=False),
 }

@@ -122,7 +122,6 @@ def settings_of(settings: Settings) -> Records:
         pngl=settings.guidance == "pngl",
         deviates=settings.deviation != "none",
         as_occupant=settings.deviation == "occupant",
-        l_l=settings.follower_law == "l-l",
         by_slot_frame=settings.follower_frame == "slot-frame",
         **{name: float(value) for name, value in values.items() if isinstance(value, int | float)},
     )

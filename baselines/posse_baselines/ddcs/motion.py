@@ -21,13 +21,12 @@ from posse_baselines.ddcs.memory import Team, since
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
 from posse_baselines.laws.exploration import push_from, push_inwards
-from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled, unit, vector, wrap
+from posse_baselines.laws.geometry import angle_of, clip, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
-_LEAST_CROSSING: Final = 0.15  # sine of the angle between the lines of l-l, below which it is l-φ on the nearer robot
 
 
 # --- the tasks -----------------------------------------------------------------------------------
@@ -59,7 +58,7 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
     else:
         near, far = settings.near, settings.far
         if follows(team, me, mates):
-            error = length(place_by(team, me, mates[me.leader], 0).place - me.position)
+            error = length(place_by(team, me, mates[me.leader]).place - me.position)
         elif settings.pngl:
             near, far = settings.range_near, settings.range_far
             arm = team.slots[me.slot] * me.frame
@@ -95,7 +94,7 @@ def move(team: Team, me: Record, mates: Records) -> None:
         if me.task == FLOCKING:
             follow(team, me, mates)
         else:
-            ref = place_by(team, me, mates[me.leader], 0)
+            ref = place_by(team, me, mates[me.leader])
             slot = steering.slot_velocity(vector(ref.speed, ref.theta), ref.frame_rate, ref.place - ref.position)
             way = ref.place - me.position
             want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration))
@@ -171,7 +170,7 @@ def pursue(team: Team, me: Record) -> None:
 
 
 class Reference(NamedTuple):
-    """A team-mate that a follower keeps its place by, as it moves now."""
+    """The leader as it moves now, and a follower's place by it."""
 
     position: complex
     speed: float
@@ -179,43 +178,42 @@ class Reference(NamedTuple):
     place: complex
     """Where the follower is wanted."""
     frame: float
-    """Heading (rad) of the frame that the formation is kept in: the mate's own (figure 6), or the slot frame."""
+    """Heading (rad) of the frame that the formation is kept in: the leader's own (figure 6), or the slot frame."""
     frame_rate: float
     """rad/s"""
 
 
 @compiled
-def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
-    """Return a team-mate as it moves now, and the own place by one in its ``slot``.
+def place_by(team: Team, me: Record, leader: Record) -> Reference:
+    """Return the leader as it moves now, and the own place by it.
 
-    A mate that has been silent for too long counts as stopped. In the first step, the mate is
-    expected to move as the target does.
+    One that has been silent for too long counts as stopped. In the first step, it is expected to move as the target.
     """
-    theta, age = angle_of(mate.heading), since(team, me, mate.step)
+    theta, age = angle_of(leader.heading), since(team, me, leader.step)
     speed, rate = 0.0, 0.0
     if age <= me.patience:
-        speed, rate = float(length(mate.velocity) if mate.step > 0 else me.target_speed), float(mate.turn)
+        speed, rate = float(length(leader.velocity) if leader.step > 0 else me.target_speed), float(leader.turn)
         theta = wrap(theta + rate * (age + team.world.lead))
     frame = theta
     if team.settings.by_slot_frame:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
-    place = mate.place + (team.slots[me.slot] - team.slots[slot]) * vector(1.0, frame)
-    return Reference(mate.place, speed, theta, place, frame, rate)
+    place = leader.place + (team.slots[me.slot] - team.slots[0]) * vector(1.0, frame)
+    return Reference(leader.place, speed, theta, place, frame, rate)
 
 
 @compiled
-def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[formation.Demand, float]:
-    """Return the demand of l-φ on the control point c_j by a team-mate in its ``slot``, and the wanted direction of l.
+def follow(team: Team, me: Record, mates: Records) -> None:
+    """Set the motion of a follower in the flock by l-φ on the leader: velocity of c_j, and its command.
 
     c_j is wanted where it lies when the robot is in its place, and heads as one does there.
     """
     settings, offset = team.settings, team.settings.point_offset
-    ref = place_by(team, me, mate, slot)
-    velocity, arm = vector(ref.speed, ref.theta), ref.place - ref.position
-    heading = steering.slot_heading(velocity, ref.frame_rate, arm, ref.frame)
+    ref = place_by(team, me, mates[me.leader])
+    arm = ref.place - ref.position
+    heading = steering.slot_heading(vector(ref.speed, ref.theta), ref.frame_rate, arm, ref.frame)
     now = me.position + scaled(me.heading, offset) - ref.position
     wanted, back = arm + vector(offset, heading), vector(1.0, -ref.theta)
-    demand = formation.l_phi_demand(
+    velocity = formation.l_phi_velocity(
         now * back,
         wanted * back,
         ref.theta - angle_of(me.heading),
@@ -224,44 +222,6 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[formatio
         formation.sampled_rate(settings.alpha_1, me.dt),
         formation.sampled_rate(settings.alpha_2, me.dt),
     )
-    return demand, angle_of(wanted)
-
-
-@compiled
-def second_of(team: Team, me: Record, mates: Records) -> int:
-    """Return the team-mate that a follower under l-l keeps its distance from beside the leader.
-
-    Of those whose slots come between the leader's and its own, and who are in their places: the one
-    of the last slot from which the lines to both cross widely enough in the follower's place. -1 if
-    there is none.
-    """
-    found, place = -1, team.slots[me.slot]
-    to_leader = place - team.slots[0]
-    for j in range(len(mates)):
-        mate = mates[j]
-        if j == me.leader or mate.task != FLOCKING or not 0 < mate.slot < me.slot:
-            continue
-        if (found >= 0 and mate.slot < mates[found].slot) or not mate.there:
-            continue
-        to_mate = place - team.slots[mate.slot]
-        if abs(cross(to_leader, to_mate)) >= 2.0 * _LEAST_CROSSING * (length(to_leader) * length(to_mate)):
-            found = j
-    return found
-
-
-@compiled
-def follow(team: Team, me: Record, mates: Records) -> None:
-    """Set the motion of a follower in the flock: velocity of c_j, and its command.
-
-    By l-φ on the leader, or by l-l on the leader and another robot where there is one.
-    """
-    offset = team.settings.point_offset
-    demand, wanted = demand_by(team, me, mates[me.leader], 0)
-    velocity = demand.velocity
-    second = second_of(team, me, mates) if team.settings.l_l else -1
-    if second >= 0:
-        other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
-        velocity = formation.l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)
     me.wish = velocity * me.heading
     speed, omega = formation.held_command(velocity, offset, me.dt)
     me.wish_speed, me.wish_omega = formation.limit_command(me, speed, omega, offset)

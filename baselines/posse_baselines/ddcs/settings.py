@@ -27,7 +27,7 @@ class Settings:
 
     model: Literal["distributed", "centralized"] = "distributed"
     """``"distributed"``: every tracker is guided by the target (``guidance``); ``"centralized"``:
-    only the leader is, the others follow it by ``follower_law``."""
+    only the leader is, the others follow it by l-φ."""
     guidance: Literal["slot", "pngl"] = "slot"
     """Law of trackers guided by the target: ``"slot"`` (Cartesian: the slot's velocity and a gain
     on its offset) or ``"pngl"`` (θ = K σ + c, and (13) with a correction of the range)."""
@@ -38,9 +38,6 @@ class Settings:
     """K of PNGL: of the leader, and the mean of a distributed team."""
     spread: float = number(0.0, "", 0.0, 0.1)
     """By how much K differs from the mean at both ends of a distributed team, η in the paper."""
-    follower_law: Literal["l-phi", "l-l"] = "l-phi"
-    """``"l-phi"`` (distance and direction from the leader) or ``"l-l"`` (from the third robot on,
-    the distances from the leader and from a follower before it in the order of the slots)."""
     follower_frame: Literal["leader", "slot-frame"] = "leader"
     """Frame in which a follower's φ_d is constant: the leader's heading (figure 6) or the slot
     frame."""
@@ -101,7 +98,7 @@ class Settings:
     alpha_2: float = tuned(2.0, "1/s", 0.2, 6.0)
     """α_2 of the l-φ law."""
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
-    """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
+    """d, how far ahead of its axle the point lies that a follower controls by l-φ."""
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)

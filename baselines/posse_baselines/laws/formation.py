@@ -1,6 +1,6 @@
-"""Formation control: by l-φ a follower keeps distance and direction from one leader, by l-l its distances from two.
+"""Formation control: by l-φ a follower keeps distance and direction from its leader.
 
-Section 3.4, figure 6; Desai, Ostrowski and Kumar (2001), l-ψ and l-l. Symbols, for a follower j on a leader i (and k):
+Section 3.4, figure 6; Desai, Ostrowski and Kumar (2001), l-ψ. Symbols, for a follower j on a leader i:
 
 ====================  ======  ====================================================================
 ``l``                 m       distance from the leader's centre to the follower's control point
@@ -21,28 +21,19 @@ Its velocity in the follower's own axes is the complex number v_j + i d ω_j.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from posse.numeric import Record, compiled
-from posse_baselines.laws.geometry import angle_of, clip, dot, length, vector, wrap
-
-
-class Demand(NamedTuple):
-    """What l-φ demands of a control point."""
-
-    l: float  # noqa: E741 (the paper's symbol)
-    gamma: float
-    velocity: complex
-    """v_j + i d ω_j, m/s."""
+from posse_baselines.laws.geometry import angle_of, clip, length, vector, wrap
 
 
 @compiled
-def l_phi_demand(
+def l_phi_velocity(
     now: complex, wanted: complex, turned: float, leader_speed: float, frame_rate: float, alpha_1: float, alpha_2: float
-) -> Demand:
-    """Return the demand on a control point that is, and is wanted, at a position (m) in the leader's own axes.
+) -> complex:
+    """Return the velocity v_j + i d ω_j (m/s) wanted of a control point.
 
-    Its wanted velocity is A along the line of l, and B to its left::
+    It is, and is wanted, at a position (m) in the leader's own axes. It moves at A along the line of l, and B to its
+    left::
 
         A =   α_1 (l_d - l)           + v_i cos(φ)        v_j   = A cos(γ) - B sin(γ)
         B = l α_2 wrap(φ_d - φ)   - v_i sin(φ) + l ω_i    d ω_j = A sin(γ) + B cos(γ)
@@ -54,8 +45,7 @@ def l_phi_demand(
     l, phi = length(now), angle_of(now)  # noqa: E741
     along = alpha_1 * (length(wanted) - l) + leader_speed * math.cos(phi)
     turning = alpha_2 * wrap(angle_of(wanted) - phi) + frame_rate
-    gamma = phi + turned
-    return Demand(l, gamma, complex(along, l * turning - leader_speed * math.sin(phi)) * vector(1.0, gamma))
+    return complex(along, l * turning - leader_speed * math.sin(phi)) * vector(1.0, phi + turned)
 
 
 @compiled
@@ -81,7 +71,7 @@ def held_command(velocity: complex, point_offset: float, dt: float) -> tuple[flo
 
 @compiled
 def limit_command(body: Record, speed: float, omega: float, point_offset: float) -> tuple[float, float]:
-    """Return the command (V, ω) of l-φ or l-l control within a robot's limits.
+    """Return the command (V, ω) of l-φ control within a robot's limits.
 
     A command to reverse becomes a turn on the spot, the short way round, towards the velocity wanted of the control
     point: at the rate that moves the control point at the wanted speed, so that it fades out where nothing is wanted.
@@ -90,29 +80,3 @@ def limit_command(body: Record, speed: float, omega: float, point_offset: float)
         sideways = math.hypot(speed, omega * point_offset)
         speed, omega = 0.0, math.copysign(sideways / point_offset, omega)
     return min(speed, body.max_speed), clip(omega, -body.max_omega, body.max_omega)
-
-
-@compiled
-def l_l_velocity(i: Demand, k: Demand, wanted_crossing: float, min_crossing_sine: float) -> complex:
-    """Return v_j + i d ω_j (m/s) that keeps a follower's distances to two leaders i and k.
-
-    Both dl/dt equations, solved for v_j and d ω_j::
-
-        cos(γ_i) v_j + sin(γ_i) d ω_j = A_i
-        cos(γ_k) v_j + sin(γ_k) d ω_j = A_k
-
-    The determinant is sin(γ_k - γ_i), the sine of the angle at which the two lines cross.
-    Two distances fit two places, one on each side of the line through the leaders:
-    ``wanted_crossing`` (rad), γ_k - γ_i in the wanted place, says which. Where the lines
-    are nearly parallel (a sine below ``min_crossing_sine``, in (0, 1)), or the follower is on the
-    wrong side, it keeps its place on the nearer leader instead, by l-φ. Without limits each distance error decays as
-    exp(-α_1 t) otherwise.
-    """
-    determinant = math.sin(k.gamma - i.gamma)
-    side = 1.0 if math.sin(wanted_crossing) >= 0.0 else -1.0
-    if side * determinant < min_crossing_sine:
-        return i.velocity if i.l <= k.l else k.velocity
-    a_i, a_k = dot(i.velocity, vector(1.0, i.gamma)), dot(k.velocity, vector(1.0, k.gamma))
-    speed = (a_i * math.sin(k.gamma) - a_k * math.sin(i.gamma)) / determinant
-    sideways = (a_k * math.cos(i.gamma) - a_i * math.cos(k.gamma)) / determinant
-    return complex(speed, sideways)

@@ -35,7 +35,6 @@ MEANINGS: Final = {
     "ddcs-centralized-pursuit": "a leader under velocity pursuit, followers under l-φ",
     "ddcs-distributed": "every tracker holds its own slot by the slot law",
     "ddcs-centralized": "a leader that holds its slot, followers under l-φ",
-    "ddcs-centralized-l-l": "the same, followers by l-l from the third robot on",
     "ddcs-centralized-no-exchange": "the first leader stays leader, even when broken",
     "ddcs-no-radio": "ddcs-distributed that ignores messages",
     "ddcs-tuned": "ddcs-distributed with settings tuned for the scenario",
@@ -45,7 +44,6 @@ MEANINGS: Final = {
 }
 """Of each a sentence, as ``posse policies`` shows it."""
 ABLATIONS: Final = (
-    *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-l-l"),
-    *("ddcs-centralized-no-exchange", "ddcs-no-radio"),
+    *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-no-exchange", "ddcs-no-radio"),
 )
 """Policies that show what one part of another is good for; ``posse policies`` leaves them out."""

@@ -1,4 +1,4 @@
-"""Guidance, l-φ and l-l: geometry of a pair, heading and rate, the speed of (13), demands on a follower."""
+"""Guidance and l-φ: geometry of a pair, heading and rate, the speed of (13), demands on a follower."""
 
 import cmath
 import math
@@ -12,7 +12,6 @@ from tests.support.reference.motion import on_arc
 
 from posse_baselines.ddcs.memory import record
 from posse_baselines.laws import formation, guidance
-from posse_baselines.laws.formation import Demand
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.guidance import BODY, line_of_sight, regulate
 
@@ -153,8 +152,8 @@ def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
 ) -> None:
     assume(abs(short_way(phi_d - phi)) < math.pi - 1e-6)  # at half a turn either way is right
     now, wanted = cmath.rect(l_now, phi), cmath.rect(l_d, phi_d)
-    demand = formation.l_phi_demand(now, wanted, turned, leader_speed, leader_omega, 2.0, 1.5)
-    along = demand.velocity * cmath.exp(-1j * (phi + turned))  # along l, and across it
+    velocity = formation.l_phi_velocity(now, wanted, turned, leader_speed, leader_omega, 2.0, 1.5)
+    along = velocity * cmath.exp(-1j * (phi + turned))  # along l, and across it
     leader = cmath.rect(leader_speed, -phi)
     assert along.real - leader.real == pytest.approx(2.0 * (l_d - l_now), abs=1e-9)
     phi_rate = (along.imag - leader.imag) / l_now - leader_omega
@@ -187,20 +186,3 @@ def test_limits_hold_and_reversing_becomes_a_turn(speed: float, omega: float) ->
         assert limited[0] == 0.0
         assert abs(limited[1]) == pytest.approx(min(wanted, 2.0))
         assert limited[1] * omega >= 0.0
-
-
-# --- l-l -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("wanted", [1.2, -1.2])
-@pytest.mark.parametrize("crossing", [0.1, 0.2, 1.5, 2.9, -0.1, -0.2, -1.5, -2.9])
-def test_l_l_asks_for_both_rates_where_the_lines_cross_on_the_wanted_side(crossing: float, wanted: float) -> None:
-    gamma_i, gamma_k = 0.4, 0.4 + crossing
-    i = Demand(1.0, gamma_i, (0.3 + 0.7j) * cmath.exp(1j * gamma_i))
-    k = Demand(2.0, gamma_k, (-0.5 + 0.2j) * cmath.exp(1j * gamma_k))
-    found = formation.l_l_velocity(i, k, wanted, 0.15)
-    rates = [(found * cmath.exp(-1j * gamma)).real for gamma in (gamma_i, gamma_k)]
-    if math.copysign(1.0, wanted) * math.sin(crossing) < 0.15:  # l-φ on the nearer leader
-        assert found == pytest.approx(i.velocity)
-    else:
-        assert rates == pytest.approx((0.3, -0.5))

@@ -1,4 +1,4 @@
-"""Followers of the centralized model as policies play them: l-φ and l-l, and their frames."""
+"""Followers of the centralized model as policies play them: l-φ and its frames."""
 
 import cmath
 import math
@@ -75,17 +75,3 @@ def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(
         place = complex_of(now.tracker)[0]
         axis = now.psi[0] if frame == "slot-frame" else now.tracker[0, 0, 2]
         assert abs((place[1] - place[0]) * cmath.exp(-1j * axis) - PLACE) < 0.01
-
-
-# --- l-l -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.003), (0.02, 0.001)])
-def test_l_l_closes_the_distances_to_two_robots(dt: float, allowed: float) -> None:
-    error = -0.35 + 0.2j  # under l-φ the second distance is up to 0.006 m and 0.008 m off
-    seen = team("ddcs-centralized-l-l", 0j, error, dt=dt, seconds=2.0)
-    decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
-    for mate, place in ((0, 0j), (1, PLACE)):
-        off = np.abs(arms(seen, 2, mate)) - abs(PLACE.conjugate() + OFFSET - place)
-        # In the first step it is not known which robots are in their places: l-φ is used.
-        np.testing.assert_allclose(off[2:], off[2] * decay[2:] / decay[2], atol=allowed)
