@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
-from typing import Any, get_args, get_type_hints
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 
-@dataclass(frozen=True)
-class Tunable:
-    """A setting that a search may change.
+class Tunable(NamedTuple):
+    """A setting that a search may change, by the name of its field, and its value in the policy asked for.
 
-    Attributes:
-        name: Of the field.
-        default: Its value in the policy asked for.
-        low: Least value.
-        high: Greatest value.
-        unit: Empty for a plain number.
-        above: Name of the setting that it must exceed; empty: none.
+    ``unit`` is empty for a plain number, ``above`` the name of a setting that it must exceed, or empty.
     """
 
     name: str
@@ -25,7 +17,7 @@ class Tunable:
     low: float
     high: float
     unit: str
-    above: str = ""
+    above: str
 
 
 def number(default: float | None, unit: str, low: float, high: float) -> Any:

@@ -102,15 +102,13 @@ class BasePolicy:
         return f"<policy {self.name!r}>"
 
 
-def check_observations(
-    name: str, observations: npt.ArrayLike, robots: tuple[int, ...], layout: ObservationLayout
-) -> FloatArray:
+def check_observations(observations: npt.ArrayLike, robots: tuple[int, ...], layout: ObservationLayout) -> FloatArray:
     """Return the observations of robots (E, R) as kernels take them; PolicyError if they are not (E, R, F)."""
     array = np.ascontiguousarray(observations, np.float32)
     wanted = (*robots, layout.size)
     if array.shape != wanted:
         raise PolicyError(
-            f"policy {name!r} got observations of shape {array.shape}, wanted {wanted}: "
+            f"a policy got observations of shape {array.shape}, wanted {wanted}: "
             "(worlds, robots it moves, observation length) of the layout that begin() was given"
         )
     return array

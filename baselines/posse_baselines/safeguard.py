@@ -26,7 +26,7 @@ from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
 from posse_baselines.ddcs.memory import Minds
-from posse_baselines.policy import PolicyError, check_observations, split_agents, stack_agents
+from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 
 
@@ -51,7 +51,7 @@ class Guard(Minds):
         """
         shape = (*self.me.shape, max(2, *np.shape(wanted)[-1:]))
         actions = as_motions("the array of wanted velocities", wanted, shape, discrete=False).copy()
-        self.run(guard_all, check_observations("safeguard", observations, self.me.shape, self.layout), actions)
+        self.run(guard_all, observations, actions)
         return actions
 
 

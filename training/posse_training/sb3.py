@@ -108,7 +108,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F)."""
         layout, worlds, encoder, guard, states, begins = memory
-        seen = check_observations(self.name, observations, (worlds, layout.scenario.num_trackers), layout)
+        seen = check_observations(observations, (worlds, layout.scenario.num_trackers), layout)
         trackers = seen.shape[1]
         if encoder is not None:
             seen = encoder.encode(seen)

@@ -35,14 +35,14 @@ import numpy as np
 from posse import SENSORS, ObservationLayout, Scenario
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
-from posse_baselines.ddcs.memory import Kernel, Minds, Team, for_each, is_due, unit_of
+from posse_baselines.ddcs.memory import Minds, Team, for_each, is_due, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, place_mates, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError
 
 BASELINE: Final = Settings(
     model="centralized",
@@ -114,7 +114,9 @@ class DDCS(BasePolicy):
         Ahead and to the left of each tracker, as shares of its greatest speed. The first half of :meth:`act`; the
         second half, :meth:`carry_out`, follows with the same observations.
         """
-        return self._run(propose_all, observations, memory, np.zeros((*memory.me.shape, 2), np.float32)), memory
+        proposals = np.zeros((*memory.me.shape, 2), np.float32)
+        memory.run(propose_all, observations, proposals)
+        return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
@@ -124,11 +126,8 @@ class DDCS(BasePolicy):
         """
         actions = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
         actions[..., :2] = corrections
-        return self._run(carry_out_all, observations, memory, actions), memory
-
-    def _run(self, kernel: Kernel, observations: FloatArray, memory: Memory, out: FloatArray) -> FloatArray:
-        memory.run(kernel, check_observations(self.name, observations, memory.me.shape, memory.layout), out)
-        return out
+        memory.run(carry_out_all, observations, actions)
+        return actions, memory
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).

@@ -25,6 +25,7 @@ from posse.scenarios.scenario import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.steering import Work, work_for, work_of
+from posse_baselines.policy import check_observations
 
 Kernel = Callable[..., None]
 _F, _I, _C = np.float32, np.int32, np.complex64
@@ -259,8 +260,9 @@ class Minds(OwnArrays):
 
     def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
         """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
-        work = work_for(self.mates.shape[2])
-        rows = observations if unit_of(self.layout.scenario) == 1.0 else observations / self._units
+        rows, work = check_observations(observations, self.me.shape, self.layout), work_for(self.mates.shape[2])
+        if unit_of(self.layout.scenario) != 1.0:
+            rows = rows / self._units
         over_worlds(kernel, ((self.team, self.me, self.mates), work, rows, out), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:

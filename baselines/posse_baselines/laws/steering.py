@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from posse.numeric import MOST_THREADS, Records, compiled
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
+from posse_baselines.laws.guidance import BRAKING_SHARE
 from posse_baselines.laws.safeguard import DISC
 
 NEVER: Final = 1e6
@@ -25,7 +26,6 @@ _SLOW: Final = 1e-2  # m/s; below it a slot's direction of motion is undefined
 _MIN_DISTANCE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
 _LEAST_TURN: Final = 0.6  # rad; least angle ahead on the circle for a tracker on or inside it
 _MOST_DISCS: Final = 32
-_BRAKING_SHARE: Final = 0.8  # of the greatest deceleration, which a planned approach uses
 
 
 class Work(NamedTuple):
@@ -79,7 +79,7 @@ def approach_velocity(way: complex, slot: complex, gain: float, max_speed: float
     """
     distance = length(way)
     if distance > 1e-6:
-        gain = min(gain, math.sqrt(2.0 * _BRAKING_SHARE * deceleration / distance))
+        gain = min(gain, math.sqrt(2.0 * BRAKING_SHARE * deceleration / distance))
     approach = gain * distance
     unit = complex(way.real / max(distance, _MIN_DISTANCE), way.imag / max(distance, _MIN_DISTANCE))
     opening = dot(slot, unit)

@@ -177,7 +177,7 @@ class Encoder(OwnArrays):
         Call it once a control step. PolicyError if the observations have another shape.
         """
         robots = self.estimates[worlds].shape
-        rows = check_observations("encoder", observations, robots, self.layout).reshape(-1, self.layout.size)
+        rows = check_observations(observations, robots, self.layout).reshape(-1, self.layout.size)
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
         if (count := self.encoding.num_features) > 0:

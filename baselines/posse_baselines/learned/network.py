@@ -43,8 +43,6 @@ class Network(OwnArrays):
                 f"unknown activation {self.activation!r:.80} or output {self.output!r:.80}: "
                 f"known are {', '.join(ACTIVATIONS)} and {', '.join(OUTPUTS)}"
             )
-        if not self.weights or len(self.weights) != len(self.biases):
-            raise PolicyError("a network needs as many biases as weights, at least one of each")
         sizes = [self.mean.size, *(bias.size for bias in self.biases)]
         wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("normaliser.mean", "normaliser.scale"), (self.mean.size,))
         for k, (before, after) in enumerate(pairwise(sizes)):

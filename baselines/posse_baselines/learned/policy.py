@@ -27,7 +27,7 @@ from posse_baselines.files import write_atomically
 from posse_baselines.learned.inputs import EncodedField, Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
-from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError
 from posse_baselines.safeguard import Guard
 
 FORMAT: Final = 1
@@ -132,7 +132,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         One that moves the target takes (E, 1, F).
         """
         m: _Memory = memory
-        observations = check_observations(self.name, observations, m.encoder.estimates.shape, m.encoder.layout)
         inputs = m.encoder.encode(observations)
         if self.adviser is not None:
             proposals, _ = self.adviser.propose(observations, m.minds)
@@ -186,27 +185,24 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 scale=tensors["normaliser.scale"],
                 weights=tuple(tensors[f"layers.{k}.weight"] for k in range(count)),
                 biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
-                activation=str(description["activation"]),
-                output=str(description["output"]),
+                activation=description["activation"],
+                output=description["output"],
             )
             adviser = description["adviser"]  # a scripted policy of this package: a file never names other code
             if adviser is not None and adviser not in SCRIPTED:
                 raise PolicyError(f"{unknown('adviser', adviser, SCRIPTED)}: install the version that wrote it")
             read = description["encoding"]
-            fields = tuple(
-                EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
-                for name, size, unit, unknown, of_neighbour in read["fields"]
-            )
+            fields = tuple(EncodedField(*field) for field in read["fields"])
             return cls(
                 network,
-                Encoding(str(read["kind"]), int(read["neighbours"]), fields),
+                Encoding(read["kind"], read["neighbours"], fields),
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
-                bool(description["safeguard"]),
+                description["safeguard"],
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
-        except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError, RecursionError) as error:
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
 
 

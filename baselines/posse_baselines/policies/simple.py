@@ -67,7 +67,7 @@ class Pursuit(BasePolicy):
         """Return actions straight at the last fix of the target; in a circle without one."""
         layout: ObservationLayout = memory
         s = layout.scenario
-        v = layout.views(check_observations(self.name, observations, (len(observations), s.num_trackers), layout))
+        v = layout.views(check_observations(observations, (len(observations), s.num_trackers), layout))
         fix = v["target_range"][..., None] * v["target_bearing"]
         x, y = np.moveaxis(fix + np.maximum(v["target_age"], 0.0)[..., None] * v["target_velocity"], -1, 0)
         known, bearing = v["target_known"] > 0, np.arctan2(y, x)
