@@ -66,24 +66,20 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         PolicyError: Discrete actions, which are no velocities.
         TypeError: Something else.
     """
+    guarded: Any
     if isinstance(env, ParallelEnv) and hasattr(env.unwrapped, "layout"):
-        return _GuardedParallelEnv(env)
-    if isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
-        return _GuardedEnv(env)
-    raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
-
-
-def _check_continuous(space: spaces.Space[Any]) -> None:
+        guarded, space = _GuardedParallelEnv, env.action_space(env.possible_agents[0])
+    elif isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
+        guarded, space = _GuardedEnv, env.action_space
+    else:
+        raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
     if not isinstance(space, spaces.Box):
         raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
+    return guarded(env)
 
 
 class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     """A Gymnasium environment behind the safeguard."""
-
-    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        super().__init__(env)
-        _check_continuous(env.action_space)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
@@ -103,11 +99,6 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
     """A PettingZoo environment whose trackers are behind the safeguard."""
-
-    def __init__(self, env: ParallelEnv[str, Any, Any]) -> None:
-        super().__init__(env)
-        for agent in env.possible_agents:
-            _check_continuous(env.action_space(agent))
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""

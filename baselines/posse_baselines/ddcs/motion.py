@@ -89,7 +89,9 @@ def move(team: Team, me: Record, mates: Records) -> None:
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
     elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
-        hunt(team, me)
+        # To where the target is predicted, to see it again.
+        way = me.target - me.position
+        want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))))
     elif follows(team, me, mates):
         if me.task == FLOCKING:
             follow(team, me, mates)
@@ -102,13 +104,6 @@ def move(team: Team, me: Record, mates: Records) -> None:
         pursue(team, me)
     else:
         hold_slot(team, me)
-
-
-@compiled
-def hunt(team: Team, me: Record) -> None:
-    """Set the motion to see a lost target again: to its predicted position."""
-    way = me.target - me.position
-    want(me, scaled(unit(way), min(me.max_speed, team.settings.gain * length(way))))
 
 
 @compiled

@@ -101,17 +101,15 @@ class Beliefs(Minds):
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
         window = 2 * scenario.radio_delay + 2 if self.late else 0
         assumed = believed(scenario)
-        first = Batch(assumed, 1)
-        first.reset(seed=0)
-        self._start = first.arrays.copy()
-        self._start.world["step"] = -window - 1
-        self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
         self.now = Batch(assumed, self.rows)
         self.now.reset(seed=0)
         self._past = self.now.arrays.copy()
+        self._start = self.now.arrays.copy()  # its first world
+        self._start.world["step"] = -window - 1
+        self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
         """The worlds as they were at the beginning of the window, before anything was written of that moment."""
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past
-        self.step, self.newest, self.age = (np.zeros(self.rows, np.int64) for _ in range(3))
+        self.newest, self.age = np.zeros(self.rows, np.int64), np.zeros(self.rows, np.int64)
         shape = window + 1, self.rows, scenario.num_trackers
         self._told = _Told(
             np.zeros(shape, np.bool_),
@@ -131,9 +129,9 @@ class Beliefs(Minds):
         super().restart(mask)
         mask = np.repeat(mask, self.me.shape[1])
         for mine, start in zip(self._past, self._start, strict=True):
-            mine[mask] = start
+            mine[mask] = start[:1]
         self._seen[mask] = (-NEVER, 0.0)
-        self.step[mask], self.newest[mask], self.age[mask] = 0, -1, NEVER
+        self.newest[mask], self.age[mask] = -1, NEVER
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
 
@@ -157,7 +155,6 @@ class Beliefs(Minds):
         worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
         actions = self.search.actions()
         self._told.played[-1] = actions
-        self.step += 1
         return actions[rows, own, :2]
 
     def planned(self) -> BoolArray:
@@ -193,8 +190,9 @@ class Beliefs(Minds):
             told.robots[which] = _poses(place, turned, v["neighbour_speed"], v["neighbour_turn_rate"])[known]
         age = np.rint(v["target_age"] / self.dt)
         self.age = np.where(v["target_known"] > 0, age, NEVER)
-        fresh = (v["target_known"] > 0) & (v["target_range"] >= 0) & (self.step - age > self.newest)
-        self.newest[fresh] = (self.step - age)[fresh]
+        step = self.me["step"].reshape(-1) - age
+        fresh = (v["target_known"] > 0) & (v["target_range"] >= 0) & (step > self.newest)
+        self.newest[fresh] = step[fresh]
         place = position + v["target_range"] * _complex(v["target_bearing"]) * heading
         theta, frame = (_complex(v[name]) * heading for name in ("target_heading", "target_frame"))
         velocity = _complex(v["target_velocity"]) * heading
