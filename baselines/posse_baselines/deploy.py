@@ -11,11 +11,7 @@ from posse_baselines.policy import Policy, PolicyError
 
 
 class deploy:  # noqa: N801 (used as a function is)
-    """A policy that drives one robot, memory inside.
-
-    Args:
-        policy: The policy.
-        robot: The robot; its scenario needs a ``message_size`` of at least the policy's.
+    """A policy that drives one robot, memory inside; the robot's ``message_size`` has to be at least the policy's.
 
     Attributes:
         row: (F,) the robot's last observation.

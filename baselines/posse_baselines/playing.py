@@ -191,17 +191,10 @@ def poses_of(state: Mapping[str, Array], who: str) -> Array:
 def batch_for(
     policy: Policy, scenario: Scenario, num_worlds: int = 1, target: Target | None = None, **settings: Any
 ) -> Batch:
-    """Return worlds for a policy that moves the trackers, against a target.
+    """Return worlds for a policy that moves the trackers, against a target or the scenario's own motion.
 
-    Args:
-        policy: Their ``message_size`` is raised to that of this policy.
-        scenario: Settings of the worlds.
-        num_worlds: E, at least 1.
-        target: Default: the scenario's own motion.
-        settings: Further arguments of :func:`posse.batch`.
-
-    Raises:
-        PolicyError: The policy plans ahead in copies of the worlds, which have no target's policy.
+    Their ``message_size`` is raised to that of the policy; ``settings`` are further arguments of :func:`posse.batch`.
+    PolicyError if the policy plans ahead in copies of the worlds, which have no target's policy.
     """
     moved = None if target is None else target.policy
     if moved is not None and policy.reads_state:

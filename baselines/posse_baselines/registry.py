@@ -29,19 +29,11 @@ SHIPPED_TARGETS: Final = SHIPPED / "targets"
 """The folder of the learned targets that come with the package."""
 AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
-Makers = dict[str, Callable[[], Any]]
-"""What makes each policy, or target, that comes with the package."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A target, however it is moved.
-
-    Attributes:
-        name: Its name in results.
-        motion: The scenario's ``target_motion``; ``"agent"`` where a policy moves it.
-        policy: That policy; ``None`` for a scripted motion.
-    """
+    """A target by its name in results: a scripted ``target_motion`` of the scenario, or ``"agent"`` and its policy."""
 
     name: str
     motion: str
@@ -58,11 +50,12 @@ def shipped(folder: Path = SHIPPED) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
 
 
-def _teams() -> Makers:
+def _teams() -> dict[str, Callable[[], Any]]:
+    """Return what makes each policy that comes with the package."""
     return {**SCRIPTED, **{name: partial(LearnedPolicy.from_file, path) for name, path in shipped().items()}}
 
 
-def _targets() -> Makers:
+def _targets() -> dict[str, Callable[[], Any]]:
     """Return the motions that are declared, the targets that read nothing, and the learned ones."""
     scripted = {name: partial(Target, name, name) for name in TARGET_MOTIONS if name != AGENT}
     blind = {name: partial(Target, name, AGENT, policy) for name, policy in OPEN_LOOP.items()}
@@ -128,7 +121,7 @@ def load_target(target: str | Path | Target) -> Target:
     return Target(getattr(found, "name", text), AGENT, found)
 
 
-def _found(kind: str, text: str, known: Makers, readers: Mapping[str, Callable[[Path], Any]]) -> Any:
+def _found(kind: str, text: str, known: Mapping[str, Any], readers: Mapping[str, Callable[[Path], Any]]) -> Any:
     """Return what a name, a file or ``"package.module:Class"`` stands for."""
     if text in known:
         return known[text]()

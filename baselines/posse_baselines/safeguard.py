@@ -31,13 +31,7 @@ from posse_baselines.tuned import tuned_settings
 
 
 class Guard(Minds):
-    """The safeguard of R robots in each of E worlds, and what it remembers of their surroundings.
-
-    Args:
-        layout: Of the observations.
-        num_worlds: E.
-        robots: R, the robots that it moves; default: all trackers.
-    """
+    """The safeguard of R ``robots``, by default all trackers, in each of E worlds, and what it remembers of them."""
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         scenario = layout.scenario

@@ -51,19 +51,16 @@ class _WithTeammates:
 class TrackerEnv(_WithTeammates, TeamEnv):
     """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
-    **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages
-    of its team-mates. **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``.
-    **Reward**: of this tracker. **Info**, **start** and **end** as in ``posse/Team-v0``, with
-    scalar reward terms. The score is that of the team: one tracker contributes at most 1/N.
-
-    The scenario's ``message_size`` is raised to that of the team-mates' policy. With
-    ``silent=True`` (the default) the action has no message part, and the message is zeros.
+    **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages of its team-mates.
+    **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``. **Reward**: of this tracker. **Info**,
+    **start** and **end** as in ``posse/Team-v0``, with scalar reward terms. The score is that of the team: one tracker
+    contributes at most 1/N. The scenario's ``message_size`` is raised to that of the team-mates' policy.
 
     Args:
         scenario: Name of a scenario, or a scenario, with at least two trackers.
         number: Number of the controlled tracker, 0 to N - 1.
         teammates: Policy of the others, or an argument of :func:`posse_baselines.load`.
-        silent: Whether the action has no message part.
+        silent: Whether the action has no message part, and the message is zeros.
         settings: As for :class:`posse.adapters.gymnasium_env.TeamEnv`, without ``target_policy``;
             ``discrete_actions`` requires ``silent``.
 

@@ -32,8 +32,7 @@ class TunedDDCS(DDCS):
     Args:
         name: Its name; one of :data:`TUNED` if no settings are given.
         settings: Of the file; default: those that ship.
-        card: Everything that the file says: the ``policy`` whose settings were tuned, the ``scenario`` that they were
-            tuned for, what was ``dropped`` since, and more.
+        card: Everything that the file says.
     """
 
     trained_splits = ("train",)

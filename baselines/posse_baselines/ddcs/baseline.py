@@ -73,12 +73,7 @@ FAMILY: Final[dict[str, Settings]] = {
 
 
 class DDCS(BasePolicy):
-    """Three layers, four tasks, from observations and messages alone.
-
-    Args:
-        settings: Settings of the team.
-        name: Name in results; default: by the model.
-    """
+    """Three layers, four tasks, from observations and messages alone; by default it is named by its model."""
 
     message_size = MESSAGE_SIZE
 
@@ -119,10 +114,9 @@ class DDCS(BasePolicy):
         return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
-        """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
+        """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections, before the safeguard.
 
-        Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
-        give the actions of :meth:`act`.
+        Corrections (E, N, 2) are in the unit of :meth:`propose`. Zeros give the actions of :meth:`act`.
         """
         actions = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
         actions[..., :2] = corrections

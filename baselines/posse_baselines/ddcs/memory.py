@@ -224,12 +224,6 @@ MATE: Final = record(
 class Minds(OwnArrays):
     """The memory of a team of N trackers in each of E worlds, or of R robots of it.
 
-    Args:
-        layout: Of the observations.
-        settings: Of the team.
-        num_worlds: E.
-        robots: R.
-
     Attributes:
         layout: Of the observations.
         team: What the trackers have in common; ``at``, ``world`` and ``settings`` are arrays of one record.

@@ -95,8 +95,7 @@ def lawful_heading(sigma: float, navigation_constant: float, wanted_sigma: float
 def lawful_rate(navigation_constant: float, sigma_rate: float, frame_rate: float) -> float:
     """Return the turn rate (rad/s) of the lawful heading, K dσ/dt + dc/dt: (6), (12).
 
-    ``frame_rate`` (rad/s) is dψ/dt where c follows the slot frame, hence dc/dt = (1 - K) dψ/dt;
-    0 where c is constant.
+    ``frame_rate`` (rad/s) is dψ/dt where c follows the slot frame, hence dc/dt = (1 - K) dψ/dt; 0 where c is constant.
     """
     return navigation_constant * sigma_rate + (1.0 - navigation_constant) * frame_rate
 
@@ -111,11 +110,11 @@ def maintenance_speed(
 
         v = (v_i cos(θ_i - σ) + k_r (r - r_d)) / cos(δ)
 
-    so that dr/dt = k_r (r_d - r) wherever no limit is hit; δ is the tracker's deviation (M σ in the
-    paper), ``target`` the target's velocity, v_i e^(i(θ_i - σ)). ``range_gain`` k_r is in 1/s, and has to stay below
-    1 / control step. It holds for a tracker that moves away from the target too (cos δ < 0), where the target moves
-    towards it. Where cos δ is small, (13) is ill-conditioned: there the speed is the part along the heading of the
-    velocity that keeps range and bearing, the bearing turning at ``frame_rate`` (rad/s).
+    so that dr/dt = k_r (r_d - r) wherever no limit is hit; δ is the tracker's deviation (M σ in the paper), ``target``
+    the target's velocity, v_i e^(i(θ_i - σ)). ``range_gain`` k_r (1/s) has to stay below 1 / control step. It holds for
+    a tracker that moves away from the target too (cos δ < 0). Where cos δ is small, (13) is ill-conditioned: there the
+    speed is the part along the heading of the velocity that keeps range and bearing, the bearing turning at
+    ``frame_rate`` (rad/s).
     """
     along = target.real + range_gain * (r - wanted_range)
     cosine = math.cos(delta)
@@ -141,12 +140,10 @@ def turn_command(body: Record, error: float, time: float) -> float:
 def regulate(body: Record, velocity: complex, rate: float = 0.0) -> tuple[float, float]:
     """Return the command (V, ω) of a robot that tracks a velocity (m/s) within its limits.
 
-    V is the part of the velocity that lies ahead, and 0 while it points backwards: the robot turns
-    on the spot instead of reversing. The wanted velocity itself turns at ``rate`` (rad/s)::
+    V is the part of the velocity that lies ahead, and 0 while it points backwards: the robot turns on the spot. A
+    velocity near zero keeps the heading. The wanted velocity itself turns at ``rate`` (rad/s). In every quadrant::
 
         ω = clip(rate + wrap(θ_wanted - θ) / dt, -ω_max, ω_max)
-
-    It holds in every quadrant. A velocity near zero keeps the heading.
     """
     if length(velocity) < _STANDSTILL:
         return 0.0, 0.0

@@ -1,9 +1,8 @@
 """The safeguard: the collision-free velocity nearest to the wanted one.
 
-The surroundings of a tracker are a list of discs with velocities: team-mates, the target,
-obstacles, walls. A velocity is evaluated by simulating how the robot tracks it within its limits:
-the time spent within the margins, whether and when it would touch, and the distance of its final
-position from that of the wanted velocity.
+The surroundings of a tracker are a list of discs with velocities: team-mates, the target, obstacles, walls. A velocity
+is evaluated by simulating how the robot tracks it within its limits: the time spent within the margins, whether and
+when it would touch, and how far it ends from where the wanted velocity leads.
 """
 
 from __future__ import annotations
@@ -105,13 +104,11 @@ def moved(disc: Record, time: float) -> complex:
 def cost_of(
     body: Record, discs: Records, speed: float, error: float, wanted: complex, enough: float
 ) -> tuple[float, float]:
-    """Return (cost, danger) of a velocity; stops above ``enough``.
+    """Return (cost, danger) of a velocity, a speed (m/s) and the angle to its heading (rad); stops above ``enough``.
 
-    The velocity is a speed (m/s) and the angle to its heading from the present one (rad).
-
-    The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
-    price for a contact, the higher the sooner. The cost adds how far the robot ends from where the
-    wanted velocity leads, as a share of the greatest distance.
+    The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a price for a
+    contact, the higher the sooner. The cost adds how far the robot ends from where the wanted velocity leads, as a
+    share of the greatest distance.
     """
     place, danger, time = 0j, 0.0, 0.0
     v, omega, heading = body.speed, body.omega, body.heading

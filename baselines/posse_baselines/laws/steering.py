@@ -93,10 +93,9 @@ def approach_velocity(way: complex, slot: complex, gain: float, max_speed: float
 
 @compiled
 def intercept_time(way: complex, velocity: complex, max_speed: float) -> float:
-    """Return the earliest interception time (s) of a point, straight at ``max_speed``.
+    """Return the earliest interception time (s) of a point, straight at ``max_speed``; ``NEVER`` if there is none.
 
-    The point is ``way`` (m) off and moves at a constant velocity (m/s): the least root t >= 0 of
-    ``|p + s t| = V t``. ``NEVER`` if there is none.
+    The point is ``way`` (m) off and moves at a constant velocity (m/s): the least root t >= 0 of ``|p + s t| = V t``.
     """
     surplus = max_speed**2 - velocity.real**2 - velocity.imag**2
     opening, square = dot(way, velocity), dot(way, way)

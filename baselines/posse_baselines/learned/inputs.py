@@ -1,9 +1,8 @@
 """What a learned policy's network reads of an observation.
 
-A network has inputs of a fixed meaning, while a scenario's observation depends on its team size and
-message length. An :class:`Encoding` lists the fields that the network reads and the number of
-team-mates, and finds them in any layout that has them: surplus team-mates are left out, missing
-ones are filled with the field's value for "unknown". An :class:`Encoder` applies it to a layout.
+A network has inputs of a fixed meaning, while an observation depends on team size and message length. An
+:class:`Encoding` finds the fields that the network reads in any layout that has them; surplus team-mates are left out,
+missing ones are filled with the field's value for "unknown". An :class:`Encoder` applies it to a layout.
 """
 
 from __future__ import annotations
@@ -59,13 +58,7 @@ class Encoding:
 
     @classmethod
     def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
-        """Return the encoding that reads every field of a layout.
-
-        Args:
-            layout: Layout of the training scenario.
-            kind: One of :data:`KINDS`.
-            neighbours: Number of team-mates to read; default: as many as the layout has.
-        """
+        """Return the encoding that reads every field of a layout, of all team-mates or of the nearest so many."""
         fields = tuple(
             EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour) for f in layout.fields
         )
@@ -134,13 +127,9 @@ class Encoding:
 
 
 class Encoder(OwnArrays):
-    """An encoding applied to the observations of R robots in each of E worlds.
+    """An encoding applied to the observations of R ``robots``, by default all trackers, in each of E worlds.
 
-    Args:
-        encoding: Which numbers are read.
-        layout: Of the observations, which has to fit: see :meth:`Encoding.columns`.
-        num_worlds: E.
-        robots: R; default: all trackers.
+    The layout has to fit, see :meth:`Encoding.columns`.
 
     Attributes:
         estimates: (E, R), what each robot remembers of the target (:data:`posse_baselines.learned.features.ESTIMATE`).

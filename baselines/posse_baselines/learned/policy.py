@@ -1,7 +1,6 @@
 """Learned policies: a network, its encoding, and a card that says where it comes from.
 
-A policy file is one safetensors file of tensors and JSON, protected by a digest. Reading one
-interprets numbers and JSON and never runs code.
+A policy file is one safetensors file of tensors and JSON, protected by a digest. Reading one never runs code.
 """
 
 from __future__ import annotations
@@ -202,7 +201,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
-        except (LookupError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
 
 

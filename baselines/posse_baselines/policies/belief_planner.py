@@ -82,14 +82,7 @@ def believed(scenario: Scenario) -> Scenario:
 
 
 class Beliefs(Minds):
-    """The memory of E teams of N trackers, R = E N: a belief world of each, and the search for the best way in them.
-
-    Args:
-        layout: Of the observations.
-        settings: By which they monitor and search.
-        num_worlds: E.
-        plans: How they plan; ``None``: by default.
-    """
+    """The memory of E teams of N trackers, R = E N: a belief world of each, and the search for the best way in them."""
 
     def __init__(
         self, layout: ObservationLayout, settings: Settings, num_worlds: int, plans: PlannerSettings | None
@@ -265,9 +258,6 @@ class BeliefPlanner(DDCS):
 
     Where the target is known, a tracker plays the planner's choice for it in its own world; else it searches as
     ``ddcs-tuned`` does, whose monitoring, messages and safeguard it has in any case.
-
-    Args:
-        settings: How far it looks ahead, and what it tries.
     """
 
     def __init__(self, settings: PlannerSettings | None = None) -> None:

@@ -33,11 +33,7 @@ _MOTIONS: Final[dict[str, Callable[[FloatArray], tuple[npt.ArrayLike, npt.ArrayL
 
 @dataclass(frozen=True)
 class OpenLoop:
-    """A target's policy that is a function of time.
-
-    Attributes:
-        name: One of :data:`OPEN_LOOP`.
-    """
+    """A target's policy that is a function of time: one of :data:`OPEN_LOOP`."""
 
     name: str
 

@@ -48,14 +48,9 @@ class PlannerSettings(NamedTuple):
 
 
 class Search(OwnArrays):
-    """Plans in a batch of worlds: plays the law ahead in copies of them, in several ways, and keeps the best.
+    """Plans in a batch of E worlds: plays the law ahead in copies of them, in several ways, and keeps the best.
 
-    Args:
-        settings: How far it looks ahead, and what it tries.
-        batch: E worlds. Planning leaves them as they are.
-
-    Attributes:
-        teams: The ways that are kept until the next planning, and the law's memory.
+    ``teams`` has the ways that are kept until the next planning, and the law's memory.
     """
 
     def __init__(self, settings: PlannerSettings, batch: Batch) -> None:
@@ -177,12 +172,8 @@ def actions_of_target(batch: Batch) -> FloatArray:
 class Planner(BasePolicy):
     """Model-predictive control with the engine as its model: a reference, no contestant.
 
-    Every half second it copies each world several times, plays its law ahead in the copies with
-    other slots and gains, and keeps what is worth most: the score up to the first contact. Copies
-    draw other noise, losses and faults than the world will.
-
-    Args:
-        settings: How far it looks ahead, and what it tries.
+    Every half second it plays its law ahead in copies of each world with other slots and gains, and keeps what is worth
+    most: the score up to the first contact. Copies draw other noise, losses and faults than the world will.
     """
 
     name = "planner"

@@ -31,11 +31,8 @@ class Idle(BasePolicy):
 class Random(BasePolicy):
     """Every number of every action is drawn uniformly from [-1, 1).
 
-    A draw is a function of the seed and of what the tracker is given, so that a world plays alike
+    A draw is a function of the ``seed`` (at least 0) and of what the tracker is given, so that a world plays alike
     alone and in any batch.
-
-    Args:
-        seed: Of the draws, at least 0.
     """
 
     name = "random"
