@@ -8,7 +8,6 @@ from tests.support.learned import any_policy, target_for
 
 import posse
 from posse_baselines import PolicyError, batch_for, load, load_target, play, policy_names, target_names
-from posse_baselines.playing import rollout
 from posse_baselines.policies.open_loop import OPEN_LOOP
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -120,16 +119,6 @@ def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
         found = results(name)
         assert found["safe_score"] > own - 0.1, name
         assert found["contact_free"] > 0.97, name
-
-
-@pytest.mark.parametrize(("name", "turns"), [("left-circle", 1.0), ("right-circle", -1.0), ("wide-circle", 0.5)])
-def test_a_circling_target_drives_a_circle(name: str, turns: float) -> None:
-    batch = posse.batch("duel", 3, target_policy=load_target(name).policy)
-    poses = rollout(batch, load("idle"), ["target_pose"], steps=40)["target_pose"]
-    s, turned = batch.scenario, np.diff(np.unwrap(poses[..., 2], axis=0), axis=0)
-    np.testing.assert_allclose(turned, turns * s.target_turn_rate * s.control_step, rtol=1e-3, atol=1e-3)
-    moved = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1)
-    np.testing.assert_allclose(moved, s.target_speed * s.control_step, rtol=0.02)
 
 
 def test_an_open_loop_target_restarts_with_its_world() -> None:

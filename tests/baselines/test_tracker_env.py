@@ -39,20 +39,6 @@ def test_a_planner_plays_the_team_mates_and_a_number_of_numpy_is_a_tracker() -> 
     assert speeds[:, 2:].max() > 0.5
 
 
-def test_a_refused_reset_leaves_what_the_team_mates_remember() -> None:
-    observations = []
-    for refused in (False, True):
-        env = TrackerEnv("smart", seed=3)
-        env.reset()
-        for _ in range(12):
-            env.step(np.zeros(2, np.float32))
-        if refused:
-            with pytest.raises(ValueError, match="would start in"):
-                env.reset(options={"tracker_pose": np.zeros((5, 3))})
-        observations.append([env.step(np.zeros(2, np.float32))[0] for _ in range(3)])
-    np.testing.assert_array_equal(observations[0], observations[1])
-
-
 @pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])
 def test_what_cannot_be_played_is_refused(make: Any) -> None:
     for number in (5, 1.0):

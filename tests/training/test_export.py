@@ -50,7 +50,7 @@ def test_what_ships(name: str, tmp_path: Path) -> None:
     network = policy.network
     drawn = np.random.default_rng(0).normal(0, 3, (200, network.inputs))
     rows = (network.mean + drawn / np.where(network.scale, network.scale, 1)).astype(np.float32)
-    ours = forward(network.flat(), rows)
+    ours = forward(network.layers(), rows)
     assert ours.std() > 0.01  # it says something
     np.testing.assert_allclose(outputs_of(policy, rows, tmp_path), ours, rtol=0, atol=1e-5)
 

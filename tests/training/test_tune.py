@@ -9,7 +9,7 @@ import pytest
 from tests.support.runs import killed_at, quiet
 from tests.support.tunable import BEST, POLICY, small
 
-from posse_baselines import tunables
+from posse_baselines import DDCS, tunables
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
@@ -70,5 +70,5 @@ def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_defaul
     space = Space(found, [t.name for t in found])
     rng = np.random.default_rng(1)
     for point in [*rng.random((200, len(found))), np.zeros(len(found)), np.ones(len(found))]:
-        settings.replace(**space.values(point))
+        DDCS(settings).with_settings(**space.values(point))
     assert space.values(space.start) == pytest.approx({t.name: t.default for t in found}, rel=1e-5, abs=1e-9)

@@ -6,8 +6,6 @@ import numpy as np
 from tests.support.drive import Instant, drive
 
 from posse_baselines.ddcs import EXCHANGING, SEARCHING
-from posse_baselines.ddcs.monitoring import COUNT
-from posse_baselines.ddcs.roles import better_claim
 
 
 def agree(now: Instant) -> Any:
@@ -92,17 +90,3 @@ def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -
             assert (leader[:, :1] == leader[:, :2]).all()
             assert (leader[:, 2:3] == leader[:, 2:]).all()
     assert agree(now).all()
-
-
-# --- claims --------------------------------------------------------------------------------------
-
-
-def test_claims_are_ordered_without_a_tie() -> None:
-    claims = [(term, leader) for term in (COUNT - 1, 0, 1) for leader in (0, 3)]
-    for a in claims:
-        for b in claims:
-            if a != b:
-                assert better_claim(*a, *b) != better_claim(*b, *a)
-    assert better_claim(0, 4, COUNT - 1, 1)  # counts wrap round
-    assert better_claim(5, 1, 5, 2)
-    assert better_claim(0, 3, 9, -1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import begin, load, rollout
+from posse_baselines import load, rollout
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
@@ -39,24 +39,6 @@ def test_noise_of_the_headings_is_filtered() -> None:
     assert errors[0.1] <= 0.5 * noise
 
 
-def test_without_radio_nothing_heard_has_an_effect() -> None:
-    policy = load("ddcs-no-radio")
-    batch = posse.batch("field", 4, message_size=5)
-    observations = batch.reset()
-    plain, deaf = begin(policy, batch), begin(policy, batch)
-    for _ in range(80):
-        alone = observations.copy()
-        views = batch.layout.views(alone)
-        for name in ("neighbour_number", "neighbour_age", "neighbour_range"):
-            views[name][...] = -1.0
-        heard = views["target_seen"] == 0
-        views["target_known"][heard] = 0.0
-        actions, plain = policy.act(observations, plain)
-        without, deaf = policy.act(alone, deaf)
-        np.testing.assert_array_equal(actions, without)
-        observations, *_ = batch.step(actions)
-
-
 CLEARANCE = 0.2
 
 
@@ -82,9 +64,3 @@ def test_what_is_not_in_the_way_is_passed_straight() -> None:
     assert turn([(1.0, 0.9, 0.6), (-0.5, 0.0, 0.4)], 1.0) == 0.0  # beside and behind
     assert turn([(1.0, 0.0, 0.6)], 1.0, speed=0.1) == 0.0  # it moves: left to the safeguard
     assert turn([(1001.0, 0.0, 1000.0)], 1.0) == 0.0  # a wall
-
-
-def test_an_enclosed_robot_finds_no_detour() -> None:
-    ring = [(math.cos(a), math.sin(a), 0.6) for a in np.arange(8) * math.pi / 4]
-    assert abs(turn(ring, 1.0)) > 2.0
-    assert abs(turn(ring, -1.0)) > 2.0

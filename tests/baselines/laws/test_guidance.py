@@ -100,12 +100,6 @@ def test_speed_in_the_slot_is_the_slots_whatever_its_heading() -> None:
             assert speed == pytest.approx(abs(slot), abs=1e-9)
 
 
-def test_speed_stays_within_the_limits() -> None:
-    assert guidance.maintenance_speed(0.6 + 0j, 0.0, 9.0, 1.0, 0.0, 1.0, 1.0) == 1.0
-    assert guidance.maintenance_speed(-0.6 + 0j, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0) == 0.0
-    assert guidance.maintenance_speed(-0.6 + 0j, 1.5, 1.0, 1.0, 0.0, 1.0, 1.0) == 0.0
-
-
 # --- heading regulation --------------------------------------------------------------------------
 
 
@@ -168,12 +162,6 @@ def test_a_held_command_takes_the_control_point_where_its_velocity_leads(
     speed, omega = formation.held_command(complex(ahead, across), OFFSET, dt)
     place, heading = on_arc(0j, 1 + 0j, speed, omega, dt)
     assert place + OFFSET * heading == pytest.approx(OFFSET + dt * complex(ahead, across), abs=1e-9)
-
-
-def test_the_sampled_rate_leaves_what_an_exponential_leaves() -> None:
-    for alpha, dt in ((2.0, 0.1), (0.5, 0.02)):
-        left = 1.0 - dt * formation.sampled_rate(alpha, dt)
-        assert left == pytest.approx(math.exp(-alpha * dt))
 
 
 @given(st.floats(-5.0, 5.0), st.floats(-20.0, 20.0))

@@ -5,7 +5,7 @@ import pytest
 from tests.support.learned import network_for
 
 import posse
-from posse_baselines import DDCS, PolicyError, load, play
+from posse_baselines import DDCS, play
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.learned import Encoding, LearnedPolicy
 
@@ -43,14 +43,3 @@ def test_an_answer_is_twice_as_large_a_correction_and_leaves_the_message() -> No
     plain, _ = ddcs.act(observations, ddcs.begin(batch.layout, 6))
     assert (corrected[..., :2] != plain[..., :2]).any()
     np.testing.assert_array_equal(corrected[..., 2:], plain[..., 2:])
-
-
-def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
-    played = play(worlds(40), listener((0.3, 0.0)), seed=3)
-    assert played["contact_free"].mean() > 0.8, "always faster, come what may"
-
-
-def test_only_policies_of_the_ddcs_are_advisers() -> None:
-    for name in ("planner", "pursuit"):
-        with pytest.raises(PolicyError, match="use a policy of the DDCS"):
-            LearnedPolicy(network_for(2), Encoding("features", 0, ()), {}, load(name))

@@ -10,7 +10,7 @@ from tests.support.reference.state import directions, points
 
 import posse
 from posse.numeric import FloatArray
-from posse_baselines import PolicyError, rollout
+from posse_baselines import rollout
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.learned.network import LIMIT
@@ -24,8 +24,6 @@ def test_names_are_those_of_views() -> None:
         field, _, at = name.rstrip("]").partition("[")
         index = tuple(int(i) for i in at.split(", ") if i)
         np.testing.assert_array_equal(views[field][(..., *index)].ravel(), column)
-    with pytest.raises(PolicyError, match=r"shape \(12, 5"):
-        Encoder(Encoding.of(batch.layout, "features"), batch.layout, 6).encode(np.concatenate([observations] * 2))
 
 
 def test_longer_messages_than_it_uses_change_nothing() -> None:
@@ -158,35 +156,6 @@ def test_noisy_fixes_are_averaged_while_robots_drive() -> None:
     measured = views["target_range"] * (views["target_bearing"] @ [1, 1j])
     raw, averaged = (np.sqrt(np.mean(np.abs(way - true) ** 2)) for way in (measured, soft / (1 - np.abs(soft))))
     assert averaged < 0.6 * raw
-
-
-def test_nothing_known_of_the_target_is_zeros() -> None:
-    batch = posse.batch("search", 4)
-    observations = batch.reset()
-    unknown = batch.layout.views(observations)["target_known"].reshape(-1) == 0
-    assert unknown.any()
-    features = features_of(batch, observations).reshape(-1)[unknown]
-    assert not any(features[name].any() for name in ("target", "target_velocity", "known"))
-
-
-@pytest.mark.parametrize(
-    ("places", "direction"),
-    [
-        ([(0, 0), (0, 2)], 1 - 0.5j),  # 2 m²/d² away from the other
-        ([(0, -6), (0, -8)], 1 + 0.5j + 0.5j),  # half a metre per metre beyond half way to the wall
-        ([(-9, 4), (-9, -4)], 1 + 1 + 2j / 64),  # 1 at most
-    ],
-)
-def test_explores_ahead_away_from_others_and_from_walls(places: list[tuple[int, int]], direction: complex) -> None:
-    batch = posse.batch("search", num_trackers=2)
-    poses = np.array([[(x, y, 0.0) for x, y in places]])
-    observations = batch.reset(options={"tracker_pose": poses, "target_pose": [[9.0, 9.0, 0.0]]})
-    features = features_of(batch, observations)[0, 0]
-    assert [features[name] for name in ("slot_near", "slot_far", "law_direction")] == pytest.approx(
-        3 * [direction / abs(direction)], rel=1e-4, abs=1e-4
-    )
-    assert features["law_speed"] == features["slot_away"] == 1
-    assert features["law_turn"] == pytest.approx(np.clip(3 * np.angle(direction) / 1.2, -1, 1), rel=1e-4, abs=1e-4)
 
 
 def test_a_team_that_explores_finds_the_target() -> None:
