@@ -25,19 +25,22 @@ from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
-_FIX_TRUST: Final = 0.2  # share of a noisy fix in where the target is then believed to be
-_FAR_OFF: Final = 0.5  # m; a fix this far from where the target was believed to be is taken as it is
+_STRAYS: Final = 0.002  # m; standard deviation of what a target moves in a step besides what was foreseen, after a fix
+_UNSEEN: Final = 0.012  # m; by how much more in each further step without one
 _HEADING_TRUST: Final = 0.1  # share of the difference from the believed heading of the slot frame that is corrected
 _LOST_AFTER: Final = 2.0  # s; age of a fix up to which the planned motion is played, then the script's
 _UNSEEN_DELAY: Final = 30.0  # s; by how much later slots are filled from which the target cannot be seen
 _AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that the target was believed to have
 _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
+_SLOPE_TRUST: Final = 2.0  # by how much more than its turn rate the slope of a weave's, in sines, is corrected
+_RATE_TRUST: Final = 0.1  # 1/s; of a phase's error in the rate of a weave
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
 
 _SEEN: Final = record_type(
     ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
     ("theta", np.float64),  # heading then, rad
+    ("variance", np.float64),  # of where the target is believed to be now, m²
 )
 
 
@@ -52,20 +55,17 @@ class _Told(NamedTuple):
     """(W, R) whether there is a fix of the target."""
     fix: npt.NDArray[np.complex64]
     """(W, R, 4) its position, heading, slot frame and velocity."""
+    variance: FloatArray
+    """(W, R) of that position, m²."""
     played: FloatArray
     """(W, R, rows, 2 + m) the actions."""
 
 
 def believed(scenario: Scenario) -> Scenario:
-    """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails.
-
-    A target that weaves is taken to drive straight on from its last heading.
-    """
+    """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
     near, far = scenario.start_distance
-    motion = scenario.target_motion
     return scenario.replace(
         start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # no start is played
-        target_motion="constant" if motion == "accelerating" else motion,
         sensor="range-bearing",
         sonar_beams=0,
         num_neighbours=0,
@@ -90,17 +90,17 @@ class Beliefs(Minds):
         scenario = layout.scenario
         super().__init__(layout, settings, num_worlds, scenario.num_trackers)
         self.dt, self.rows = scenario.control_step, num_worlds * scenario.num_trackers
-        self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
+        self.noise = max(scenario.range_noise, scenario.bearing_noise)
         self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
         window = 2 * scenario.radio_delay + 2 if self.late else 0
         assumed = believed(scenario)
         self.now = Batch(assumed, self.rows)
         self.now.reset(seed=0)
         self._past = self.now.arrays.copy()
+        """The worlds as they were at the beginning of the window, before anything was written of that moment."""
         self._start = self.now.arrays.copy()  # its first world
         self._start.world["step"] = -window - 1
         self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
-        """The worlds as they were at the beginning of the window, before anything was written of that moment."""
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past
         self.newest, self.age = np.zeros(self.rows, np.int64), np.zeros(self.rows, np.int64)
         shape = window + 1, self.rows, scenario.num_trackers
@@ -109,6 +109,7 @@ class Beliefs(Minds):
             np.zeros((*shape, len(_ROBOT)), np.float32),
             np.zeros(shape[:2], np.bool_),
             np.zeros((*shape[:2], 4), np.complex64),
+            np.zeros(shape[:2]),
             np.zeros((window + 1, *self.now.action_shape), np.float32),
         )
         # With more rounds, plans of trackers that know different things differ more: 0.01 to 0.02 less on radio.
@@ -123,7 +124,7 @@ class Beliefs(Minds):
         mask = np.repeat(mask, self.me.shape[1])
         for mine, start in zip(self._past, self._start, strict=True):
             mine[mask] = start[:1]
-        self._seen[mask] = (-NEVER, 0.0)
+        self._seen[mask] = (-NEVER, 0.0, 0.0)
         self.newest[mask], self.age[mask] = -1, NEVER
         self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
         self.search.restart(mask)
@@ -194,6 +195,8 @@ class Beliefs(Minds):
         fix = np.stack([place, theta, frame, velocity], axis=-1)
         at = window - np.minimum(age, window).astype(np.int64)[fresh], np.flatnonzero(fresh)
         told.fixed[at], told.fix[at] = True, fix[fresh]
+        away = np.minimum(v["target_range"], self.layout.scenario.sensing_range)  # of who saw it: at most
+        told.variance[at] = ((self.noise * away) ** 2)[fresh]
 
     def _write(self, seen: Records, moment: int) -> None:
         """Write what was told of the present moment of the worlds into them."""
@@ -204,12 +207,14 @@ class Beliefs(Minds):
             worlds.tracker[name][told.heard] = told.robots[told.heard, k]
         here = told.fixed
         place, theta, frame, velocity = told.fix.T.astype(np.complex128)
-        gap = (w["step"] - seen["step"]) * self.dt
+        steps = w["step"] - seen["step"]
+        gap = steps * self.dt
         first = gap > _LOST_AFTER
-        if self.noisy:
-            foreseen = w["x"] + 1j * w["y"]
-            off = place - foreseen
-            place = foreseen + np.where(first | (np.abs(off) > _FAR_OFF), 1.0, _FIX_TRUST) * off
+        if self.noise > 0.0:  # a Kalman filter, whose model is the world
+            seen["variance"] += _STRAYS**2 + (_UNSEEN * (steps - 1)) ** 2
+            foreseen, trust = w["x"] + 1j * w["y"], seen["variance"] / (seen["variance"] + told.variance)
+            place = foreseen + trust * (place - foreseen)
+            seen["variance"][here] = (trust * told.variance)[here]
         noise = self.layout.scenario.heading_noise
         if noise > 0.0:  # it is the same of both headings, and how the slot frame turns is known
             error = np.angle(frame / (w["frame_cos"] + 1j * w["frame_sin"]))
@@ -232,12 +237,26 @@ class Beliefs(Minds):
             w["pressed"][wrong & ~turning & (pressed < 0.9 * dart)] = PATIENCE - 0.5
         else:
             goal = np.where(first | (np.abs(surprise) > 10 * _AGREES), theta, goal * np.exp(1j * surprise))
+        if s.target_motion == "accelerating":
+            self._correct_weave(here & (gap <= _GAP), turn)
         w["x"][here], w["y"][here], w["speed"][here], w["turn_rate"][here] = (
             value[here] for value in (place.real, place.imag, speed, turn)
         )
         for name, direction in (("heading", theta), ("frame", frame), ("goal", goal)):
             w[f"{name}_cos"][here], w[f"{name}_sin"][here] = direction.real[here], direction.imag[here]
         seen["step"][here], seen["theta"][here] = w["step"][here], angle[here]
+
+    def _correct_weave(self, here: BoolArray, turn: FloatArray) -> None:
+        """Correct the weaves of the worlds of a mask (R,) by the turn rates (R,) that were measured."""
+        w, limit = self.now.arrays.world, self.now.scenario.target_turn_rate
+        mask = here & (np.abs(turn) < 0.95 * limit)  # a faster one turns from a wall
+        amplitude, rate, turn = w["weave_amplitude"][mask], w["weave_rate"][mask], turn[mask]
+        wave = amplitude * np.exp(1j * (w["weave_phase"][mask] - rate * self.dt))  # its imaginary part is the turn rate
+        error = turn - wave.imag
+        rate = np.clip(rate + _RATE_TRUST * error * wave.real / amplitude**2, 0.2, 0.8)
+        wave += error * (1j + _SLOPE_TRUST)
+        w["weave_amplitude"][mask], w["weave_rate"][mask] = np.clip(np.abs(wave), 0.4 * limit, 0.9 * limit), rate
+        w["weave_phase"][mask] = (np.angle(wave) + rate * self.dt) % (2.0 * math.pi)
 
 
 def _complex(pairs: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
