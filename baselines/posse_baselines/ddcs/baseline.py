@@ -8,7 +8,7 @@ itself does. What ``pngl-l-phi`` does, with equation numbers of the paper:
 who, when                        law                                                     where
 ===============================  ======================================================  =======================
 everyone, target unknown         drives ahead, away from team-mates and borders          ``motion.explore``,
-                                                                                         ``laws.exploration``
+                                                                                         ``laws.steering``
 leader, far (converging)         PNGL, θ = K σ + c, at full speed: (5), (6), (12)        ``motion.pursue``,
                                                                                          ``laws.guidance``
 leader, near (flocking)          PNGL, the speed of (13) with a correction of the range  ``motion.pursue``

@@ -20,7 +20,6 @@ from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, since
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.laws import formation, guidance, steering
-from posse_baselines.laws.exploration import push_from, push_inwards
 from posse_baselines.laws.geometry import angle_of, clip, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
@@ -233,8 +232,8 @@ def explore(team: Team, me: Record, mates: Records) -> complex:
     """
     world, settings = team.world, team.settings
     off = me.position - (me.target if world.walled == 0 and me.fix_step >= 0 else 0j)
-    way = me.heading + scaled(push_inwards(off, world.inner), _BORDER)
+    way = me.heading + scaled(steering.push_inwards(off, world.inner), _BORDER)
     for j in range(len(mates)):
         if mates[j].there:
-            way += push_from(mates[j].place - me.position, settings.apart)
+            way += steering.push_from(mates[j].place - me.position, settings.apart)
     return scaled(unit(way), me.max_speed)

@@ -1,4 +1,4 @@
-"""Slots: their motion, interception, the Cartesian law that takes up a slot and holds it, and who takes which.
+"""Slots: their motion, interception, the law that takes up and holds one, who takes which; and pushes in the search.
 
 A slot is an arm (m) from a leader or the target, in a frame that turns with it: the slot frame ψ, or the leader's own
 heading. In a turning frame each slot moves on its own circle.
@@ -25,6 +25,7 @@ WORK_ROWS: Final = 7
 _SLOW: Final = 1e-2  # m/s; below it a slot's direction of motion is undefined
 _MIN_DISTANCE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
 _LEAST_TURN: Final = 0.6  # rad; least angle ahead on the circle for a tracker on or inside it
+_CLOSE: Final = np.float32(0.5)  # m; a nearer team-mate pushes as one at this distance
 _MOST_DISCS: Final = 32
 
 
@@ -172,3 +173,21 @@ def assign(cost: npt.NDArray[Any], work: npt.NDArray[Any]) -> None:
     for j in range(1, n + 1):
         if row_of[j] != 0.0:
             answer[int(row_of[j]) - 1] = j - 1
+
+
+@compiled
+def push_from(mate: complex, strength: float) -> complex:
+    """Return the push from a team-mate (m, relative to the robot) at a distance d: ``strength`` (m²) / d²."""
+    d: Any = max(length(mate), _CLOSE)
+    return scaled(mate, -strength / (d * d * d))
+
+
+@compiled
+def push_inwards(place: complex, start: complex) -> complex:
+    """Return the push to the middle along x and y at a place (m) from it, by their distances from the middle (m).
+
+    It is 0 up to ``start``, then 0.5 more a metre, 1 at most.
+    """
+    x = min(max(0.5 * (abs(place.real) - start.real), 0.0), 1.0)
+    y = min(max(0.5 * (abs(place.imag) - start.imag), 0.0), 1.0)
+    return complex(-x if place.real > 0.0 else x, -y if place.imag > 0.0 else y)

@@ -18,9 +18,8 @@ import numpy.typing as npt
 
 from posse.numeric import HALF, ONE, ZERO, FloatArray, Record, Records, compiled, record_type
 from posse_baselines.ddcs.memory import pair
-from posse_baselines.laws.exploration import push_from, push_inwards
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled
-from posse_baselines.laws.steering import Work, assign, slot_velocity
+from posse_baselines.laws.steering import Work, assign, push_from, push_inwards, slot_velocity
 
 _SMALL: Final = np.float32(1e-6)
 _NEAR: Final = np.float32(0.3)  # m, the default tolerance

@@ -308,8 +308,7 @@ class BeliefPlanner(DDCS):
         speed, omega = (old + followed * (new - old) for old, new in ((me["speed"], speed), (me["omega"], omega)))
         mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
         wish = mine["wish"] / unit_of(memory.layout.scenario)
-        wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
-        for name, value in wishes.items():
+        for name, value in {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}.items():
             me[name] = np.where(planned, value, me[name])
         own = wish * me["heading"].conj() / me["max_speed"]
         proposals[planned] = np.stack([own.real, own.imag], axis=-1)[planned]

@@ -43,7 +43,5 @@ MEANINGS: Final = {
     "planner": "a reference that reads the state and plays ahead in copies of the world",
 }
 """Of each a sentence, as ``posse policies`` shows it."""
-ABLATIONS: Final = (
-    *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-no-exchange", "ddcs-no-radio"),
-)
+ABLATIONS: Final = ("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-no-exchange", "ddcs-no-radio")
 """Policies that show what one part of another is good for; ``posse policies`` leaves them out."""
