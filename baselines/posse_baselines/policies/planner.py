@@ -15,16 +15,8 @@ from posse_baselines.policies.planner_law import PLAN, WAY, Teams, drive
 from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
 _CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
-_STANDARD: Final = np.array(
-    [
-        # ahead, left, gain
-        (0.0, 0.0, 1.5),
-        (-0.2, 0.0, 1.5),
-        (0.2, 0.0, 1.5),
-        (0.0, 0.0, 0.7),
-        (0.0, 0.0, 3.0),
-    ],
-    WAY,
+_STANDARD: Final = np.array(  # ahead, left, gain
+    [(0.0, 0.0, 1.5), (-0.2, 0.0, 1.5), (0.2, 0.0, 1.5), (0.0, 0.0, 0.7), (0.0, 0.0, 3.0)], WAY
 )
 """Ways that whole teams play alike; the first one is played until the first planning."""
 _RANGES: Final = {"ahead": (-0.25, 0.25), "left": (-0.2, 0.2), "gain": (0.7, 4.0)}
@@ -42,9 +34,9 @@ class PlannerSettings(NamedTuple):
     look_ahead: float = 4.0
     """How far each try is played ahead, s."""
     keep: float = 0.5
-    """How long the best is kept before the next planning, s; at most ``look_ahead``."""
+    """How long the best is kept before the next planning, s; above 0, at most ``look_ahead``."""
     rounds: int = 4
-    """Rounds of variations on the best so far, after the standard ways of playing."""
+    """Rounds of variations on the best so far, after the standard ways of playing; at least 0."""
 
 
 class Search(OwnArrays):
@@ -54,6 +46,8 @@ class Search(OwnArrays):
     """
 
     def __init__(self, settings: PlannerSettings, batch: Batch) -> None:
+        if not 0 < settings.keep <= settings.look_ahead or settings.rounds < 0:
+            raise PolicyError(f"{settings}: keep must be above 0 and at most look_ahead, rounds at least 0")
         self.settings, self.batch = settings, batch
         dt, n = batch.scenario.control_step, batch.scenario.num_trackers
         self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))

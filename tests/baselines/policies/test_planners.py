@@ -79,6 +79,8 @@ def test_the_planner_reads_only_the_batch_it_watches() -> None:
     begin(planner, posse.batch("constant", 2))
     with pytest.raises(PolicyError, match="watches 2 worlds of 'constant', not 3 of 'smart'"):
         planner.begin(other.layout, 3)
+    with pytest.raises(PolicyError, match=r"keep=5.0.*keep must be above 0 and at most look_ahead"):
+        begin(Planner(PlannerSettings(keep=5.0)), other)
 
 
 # --- the belief planner --------------------------------------------------------------------------
@@ -112,7 +114,7 @@ def test_poses_that_are_told_in_drifting_frames_are_aligned() -> None:
     assert play(batch, policy)["safe_score"].mean() > 0.5
 
 
-@pytest.mark.parametrize("motion", ["constant", "smart"])
+@pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
 def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     """What a tracker is told is 0.3 s old; of a constant target it knows the present pose, of a smart one nearly so."""
     policy = BeliefPlanner(QUICK_BELIEF)
@@ -126,3 +128,13 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
     assert np.median(wrong) < 0.01
     if motion == "constant":
         assert wrong.max() < 1e-3
+
+
+def test_noisy_fixes_are_filtered() -> None:
+    """Of a constant target, of which each fix is wrong by 6 % of its range, a team knows more after a second."""
+    noise: dict[str, Any] = {"range_noise": 0.06, "bearing_noise": 0.06, "start_distance": (2.0, 4.0)}
+    policy = BeliefPlanner(QUICK_BELIEF)
+    batch = posse.batch("constant", 8, message_size=policy.message_size, **noise)
+    played = rollout(batch, policy, ["annotations", "target_pose"], steps=30)
+    away = np.abs(played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]).max(axis=-1)
+    assert np.median(away[10:]) < 0.3 * np.median(away[0])

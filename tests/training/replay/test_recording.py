@@ -8,7 +8,7 @@ import pytest
 from tests.support.replays import short
 
 import posse
-from posse_baselines import Recorder, Trajectory, begin, load
+from posse_baselines import Recorder, begin, load
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.replay import RECORD, Player, Replay, record, replay_of
 from posse_training.replay.columns import find_events
@@ -88,26 +88,6 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
             close(column, f"reward/{name}", frame + 1, infos[f"reward/{name}"][0])
     for name, value in batch.metrics().items():
         assert player.metrics[name] == pytest.approx(float(value[0]), nan_ok=True)
-
-
-def driven(batch: posse.Batch, steps: int) -> Trajectory:
-    recorder = Recorder(batch, RECORD)
-    recorder.reset()
-    for step in range(steps):
-        recorder.step(np.full(batch.action_shape, 0.1 * np.sin(step), np.float32))
-    return recorder.trajectory()
-
-
-def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
-    many = replay_of(driven(posse.batch("radio", 5, seed=2), 30).episode(3), "a")
-    alone = replay_of(driven(posse.batch("radio", 1, seed=2, first_world=3), 30), "a")
-    assert many.world == alone.world
-    assert [many.world[name] for name in ("seed", "split", "world", "episode")] == [2, "train", 3, 0]
-    one, other = many.players[0], alone.players[0]
-    assert list(one.columns) == list(other.columns)
-    for name, values in one.columns.items():
-        np.testing.assert_array_equal(values, other.columns[name])
-    assert one.events == other.events
 
 
 def test_contacts_are_told_with_who_touched_what() -> None:
