@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import box, single_action_space
+from posse.engine.arguments import options_of
 from posse.engine.batch import Batch, of_batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray
@@ -147,6 +148,8 @@ class WorldEnv(BatchEnv):
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start an episode and return the agents' observations (..., F)."""
+        if "reset_mask" in options_of(options):
+            raise ValueError("unknown option 'reset_mask': an environment of one world has none")
         observations: FloatArray = super()._start(seed, options)[0, self._rows]
         for array in self._results[2:]:
             array[...] = 0

@@ -105,7 +105,9 @@ def _parts_of(function: FunctionType) -> tuple[Any, ...]:
     code, scope = function.__code__, dict(inspect.getclosurevars(function).nonlocals)
     if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):  # posse's globals are in its sources
         scope = {**function.__globals__, **scope}
-    codes = code, *(inner for inner in code.co_consts if isinstance(inner, CodeType))
+    codes = [code]
+    for each in codes:  # those within are added as they are found
+        codes += (inner for inner in each.co_consts if isinstance(inner, CodeType))
     names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
     found: list[Any] = [(name, scope[name]) for name in sorted(names & scope.keys())]
     modules: set[ModuleType] = {numba, np}  # looked through

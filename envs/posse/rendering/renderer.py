@@ -112,7 +112,7 @@ class Renderer:
         scene = self.follow(batch, world)
         if self.window is not None and not self.window.begin():
             return None
-        colours = colours or (TRACKER,) * number
+        colours = (TRACKER,) * number if colours is None else colours
         draw(Drawing(scene, self._history, self.camera, self._canvas, self._point, self.title, colours))
         if self.window is None:
             return self._canvas.pixels()

@@ -127,6 +127,7 @@ def test_a_step_needs_an_episode(kind: str) -> None:
     for _ in range(subject.env.scenario.horizon):
         subject.env.step(good)
     assert "after the end of the episode" in subject.refused(lambda: subject.env.step(good))
+    subject.refused(lambda: subject.env.reset(options={"reset_mask": np.zeros(1, np.bool_)}))
     subject.env.reset()
     subject.env.step(good)
 

@@ -70,6 +70,8 @@ from lists import LIMITS
 from pairs import Pair
 from posse.numeric import compiled, kernel
 
+NESTED = 1.0
+
 @compiled
 def first(x):
     return x * gains.A * deep.gains.C
@@ -81,7 +83,11 @@ def second(x, step=0.5):
 @kernel
 def total(x, pair):
     made = Pair(x, 2 * x)
-    return first(x) + second(x) + deep.gains.helper(x) + 100 * made.a + 1000 * pair.a + plain.shift(x)
+    def outer(y):
+        def inner(z):
+            return z * NESTED
+        return inner(y)
+    return outer(x) + first(x) + second(x) + deep.gains.helper(x) + 100 * made.a + 1000 * pair.a + plain.shift(x)
 
 answer = total(1.0, Pair(1.0, 7.0))
 print(answer, answer == total.py_func(1.0, Pair(1.0, 7.0)), sum(total.stats.cache_hits.values()))
@@ -92,6 +98,7 @@ EDITS = {
     "the order of a named tuple's fields": ("pairs", "    a: float\n    b: float", "    b: float\n    a: float"),
     "a constant in nested tuples": ("lists", "(2.0, 3.0)", "(2.0, 30.0)"),
     "a global of a function of numba's own": ("plain", "SHIFT = 1.0", "SHIFT = 11.0"),
+    "a global of a function within an inner one": ("main", "NESTED = 1.0", "NESTED = 2.0"),
     "a default": ("main", "step=0.5", "step=1.5"),
     "a comment and a number that it does not reach": ("gains", "A = 1.0", "# A comment.\nUNUSED = 3.0\nA = 1.0"),
 }
