@@ -41,10 +41,12 @@ class Guard(Minds):
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
 
         Call it once a control step, with its observations (E, R, F). Longer velocities are shortened to the greatest
-        speed. ValueError if the shape is another.
+        speed. ValueError if the shape is another, or a number is not finite.
         """
-        shape = (*self.me.shape, max(2, *np.shape(wanted)[-1:]))
+        shape = (*self.me.shape, max((2, *np.shape(wanted)[-1:])))
         actions = as_motions("the array of wanted velocities", wanted, shape, discrete=False).copy()
+        if not np.isfinite(actions).all():
+            raise ValueError("a wanted velocity is not a finite number")
         self.run(guard_all, observations, actions)
         return actions
 

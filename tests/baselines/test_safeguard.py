@@ -163,6 +163,10 @@ def test_invalid_environments_are_not_guarded() -> None:
     for env in (Safeguard(gymnasium.make("posse/Team-v0")), Safeguard(posse.parallel_env())):
         with pytest.raises(gymnasium.error.ResetNeeded):
             env.step({})
+    batch = posse.batch("smart", 1)
+    for wrong, words in ((np.full((1, 5, 2), np.nan), "finite"), (0.0, "shape")):
+        with pytest.raises(ValueError, match=words):
+            Guard(batch.layout, 1).actions(batch.reset(), wrong)
 
 
 @pytest.mark.parametrize("turn", [1.5, 0.0, -1.5])

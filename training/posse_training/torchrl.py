@@ -173,6 +173,7 @@ class PosseEnv(EnvBase):
         given, shape = together.detach().cpu().numpy(), self.batch.action_shape
         actions = as_motions("the array of actions", given, shape[:2] if self._discrete else shape, self._discrete)
         if self._guard is not None:
+            self.batch.check_running()
             actions = self.batch.actions_of(actions)  # before the safeguard remembers this step
             motions = self._guard.actions(self._seen, actions[:, self._rows[TRACKERS]])
             actions = np.concatenate([motions, actions[:, motions.shape[1] :]], axis=1)

@@ -135,7 +135,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         if self.adviser is not None:
             proposals, _ = self.adviser.propose(observations, m.minds)
             inputs = np.concatenate([inputs, proposals.reshape(len(inputs), MOTION)], axis=1)
-        outputs = self._forward(inputs).reshape(*observations.shape[:2], -1)
+        outputs = self._forward(inputs).reshape(*m.encoder.estimates.shape, -1)
         if self.adviser is not None:
             return self.adviser.carry_out(observations, m.minds, _REACH * outputs)[0], m
         actions = np.zeros((*outputs.shape[:2], MOTION + m.encoder.layout.scenario.message_size), np.float32)
@@ -201,7 +201,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
-        except (LookupError, TypeError, ValueError, OverflowError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
 
 

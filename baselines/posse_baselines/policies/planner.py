@@ -46,8 +46,8 @@ class Search(OwnArrays):
     """
 
     def __init__(self, settings: PlannerSettings, batch: Batch) -> None:
-        if not 0 < settings.keep <= settings.look_ahead or settings.rounds < 0:
-            raise PolicyError(f"{settings}: keep must be above 0 and at most look_ahead, rounds at least 0")
+        if not 0 < settings.keep <= settings.look_ahead < np.inf or settings.rounds < 0:
+            raise PolicyError(f"{settings}: keep must be above 0 and at most look_ahead (finite), rounds at least 0")
         self.settings, self.batch = settings, batch
         dt, n = batch.scenario.control_step, batch.scenario.num_trackers
         self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))
