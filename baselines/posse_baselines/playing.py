@@ -194,7 +194,7 @@ def batch_for(
     """Return worlds for a policy that moves the trackers, against a target or the scenario's own motion.
 
     Their ``message_size`` is raised to that of the policy; ``settings`` are further arguments of :func:`posse.batch`.
-    PolicyError if the policy plans ahead in copies of the worlds, which have no target's policy.
+    PolicyError if nothing moves the target, or the policy plans ahead in copies of the worlds, which lack its policy.
     """
     moved = None if target is None else target.policy
     if moved is not None and policy.reads_state:
@@ -205,7 +205,14 @@ def batch_for(
     size = max(scenario.message_size, policy.message_size)
     motion = scenario.target_motion if target is None else target.motion
     scenario = scenario.replace(message_size=size, target_motion=motion)
-    return posse.batch(scenario, num_worlds, target_policy=moved, **settings)
+    return _moving(posse.batch(scenario, num_worlds, target_policy=moved, **settings))
+
+
+def _moving(batch: Batch) -> Batch:
+    """Return a batch; PolicyError if its target is an agent that nothing moves."""
+    if batch.scenario.target_is_agent and not isinstance(batch, PairedBatch):
+        raise PolicyError(f"the target of {batch.scenario.name!r} is an agent: give a target too, or try posse play")
+    return batch
 
 
 def rollout(
@@ -237,12 +244,7 @@ def rollout(
     """
     if steps is not None and (steps < 1 or steps != int(steps)):
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
-    if batch.scenario.target_is_agent and not isinstance(batch, PairedBatch):
-        raise PolicyError(
-            f"the target of {batch.scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give "
-            "a target too, target=, or play it with posse play"
-        )
-    recorder = Recorder(batch, record)
+    recorder = Recorder(_moving(batch), record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)
     while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):

@@ -68,6 +68,7 @@ INVALID = {
     "replay": "1 to 4 players, got 0: give at least one policy",
     "replay none.html": "cannot read a replay from none.html",
     "replay idle --set target_motion=agent": "the target of 'smart' is an agent",
+    "watch idle --out x.gif --set target_motion=agent": "the target of 'smart' is an agent",
     "replay idle --set arna=6,4": "did you mean 'arena'",
     "replay idle --set arena": "'arena' sets nothing: write KEY=VALUE",
     "replay idle --set arena=6 arena=4": "'arena' is set twice",
