@@ -46,9 +46,7 @@ def single_action_space(message_size: int, discrete: bool) -> spaces.Space[Any]:
     if not discrete:
         return spaces.Box(-1.0, 1.0, (2 + message_size,), np.float32)
     if message_size:
-        raise ScenarioError(
-            f"discrete_actions=True cannot encode messages of message_size={message_size}: unset one of them"
-        )
+        raise ScenarioError(f"discrete_actions=True cannot encode messages of message_size={message_size}: unset one")
     return spaces.Discrete(len(MOTIONS))
 
 
@@ -61,5 +59,4 @@ def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discret
     if outside.any():
         where = f"[{', '.join(map(str, np.argwhere(outside)[0]))}]" if array.ndim else ""
         raise ValueError(f"{name}{where} is {array[outside][0]}, outside 0 to {len(MOTIONS) - 1}")
-    motions: FloatArray = MOTIONS[array]
-    return motions
+    return MOTIONS.take(array, axis=0)

@@ -28,8 +28,7 @@ from numba.core import caching, codegen, compiler, registry, serialize, types
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Final[Any] = numba.config  # Any: numba sets its names at run time
-UNCOMPILED: Final = bool(_CONFIG.DISABLE_JIT)
-"""Whether everything runs as plain Python."""
+UNCOMPILED: Final = bool(_CONFIG.DISABLE_JIT)  # everything runs as plain Python
 
 # error_model="numpy": division by zero gives inf or nan, as in numpy, and no branch to raise from.
 # nogil: other Python threads run while a batch is stepped.
@@ -111,10 +110,10 @@ def _parts_of(function: FunctionType) -> tuple[Any, ...]:
     names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
     found: list[Any] = [(name, scope[name]) for name in sorted(names & scope.keys())]
     modules: set[ModuleType] = {numba, np}  # looked through
-    for _, value in found:  # what is in modules is added as they are found
-        if isinstance(value, ModuleType) and value not in modules:
-            modules.add(value)
-            found += ((name, vars(value)[name]) for name in sorted(names & vars(value).keys()))
+    for _, part in found:  # what is in modules is added as they are found
+        if isinstance(part, ModuleType) and part not in modules and not part.__name__.startswith(("numba.", "numpy.")):
+            modules.add(part)
+            found += ((name, vars(part)[name]) for name in sorted(names & vars(part).keys()))
     return function.__module__, function.__qualname__, code, function.__defaults__, function.__kwdefaults__, found
 
 
