@@ -55,7 +55,7 @@ class _Told(NamedTuple):
     """(W, R) whether there is a fix of the target."""
     fix: npt.NDArray[np.complex64]
     """(W, R, 4) its position, heading, slot frame and velocity."""
-    variance: FloatArray
+    variance: npt.NDArray[np.float64]
     """(W, R) of that position, m²."""
     played: FloatArray
     """(W, R, rows, 2 + m) the actions."""
