@@ -114,9 +114,9 @@ class DDCS(BasePolicy):
         return proposals, memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
-        """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections, before the safeguard.
+        """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections, safely.
 
-        Corrections (E, N, 2) are in the unit of :meth:`propose`. Zeros give the actions of :meth:`act`.
+        Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows. Zeros give :meth:`act`.
         """
         actions = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
         actions[..., :2] = corrections

@@ -25,16 +25,16 @@ from posse_baselines.tuned import tuned_settings
 
 _ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _AWAY: Final = 1e3  # m; where what is not known of stands
-_STRAYS: Final = 0.002  # m; standard deviation of what a target moves in a step besides what was foreseen, after a fix
-_UNSEEN: Final = 0.012  # m; by how much more in each further step without one
+_STRAYS: Final = 0.002  # m; standard deviation of where a target is foreseen a step after a fix
+_UNSEEN: Final = 0.012  # m; what each further step without a fix adds to that of the next step
 _HEADING_TRUST: Final = 0.1  # share of the difference from the believed heading of the slot frame that is corrected
 _LOST_AFTER: Final = 2.0  # s; age of a fix up to which the planned motion is played, then the script's
 _UNSEEN_DELAY: Final = 30.0  # s; by how much later slots are filled from which the target cannot be seen
 _AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that the target was believed to have
 _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
-_SLOPE_TRUST: Final = 2.0  # by how much more than its turn rate the slope of a weave's, in sines, is corrected
-_RATE_TRUST: Final = 0.1  # 1/s; of a phase's error in the rate of a weave
+_SLOPE_TRUST: Final = 2.0  # correction of a weave's cosine for each rad/s by which its turn rate was foreseen wrong
+_RATE_TRUST: Final = 0.1  # 1/s; correction of a weave's rate for each rad by which its phase was foreseen wrong
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
 
 _SEEN: Final = record_type(
@@ -98,7 +98,7 @@ class Beliefs(Minds):
         self.now.reset(seed=0)
         self._past = self.now.arrays.copy()
         """The worlds as they were at the beginning of the window, before anything was written of that moment."""
-        self._start = self.now.arrays.copy()  # its first world
+        self._start = self.now.arrays.copy()  # every world starts as the first of these
         self._start.world["step"] = -window - 1
         self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past

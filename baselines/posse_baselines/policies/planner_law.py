@@ -129,7 +129,7 @@ def surround(c: Record, worlds: Any, e: int, i: int, discs: Records) -> int:
 
 @compiled
 def wanted_velocity(w: Record, t: Record, way: Record, slot: complex, frame_rate: float, most: float) -> complex:
-    """Return the velocity (m/s) on a course round the target that meets a slot, braked by at ``most`` so many m/s²."""
+    """Return the velocity (m/s) that meets a slot on a course round the target; ``most``: deceleration, m/s²."""
     arm, start = arm_of(w, slot), complex(t.x, t.y) - complex(w.x, w.y)
     aim = arm + complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     velocity = slot_velocity(velocity_of(w), frame_rate, aim)

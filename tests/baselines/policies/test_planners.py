@@ -131,7 +131,6 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
 
 
 def test_noisy_fixes_are_filtered() -> None:
-    """Of a constant target, of which each fix is wrong by 6 % of its range, a team knows more after a second."""
     noise: dict[str, Any] = {"range_noise": 0.06, "bearing_noise": 0.06, "start_distance": (2.0, 4.0)}
     policy = BeliefPlanner(QUICK_BELIEF)
     batch = posse.batch("constant", 8, message_size=policy.message_size, **noise)

@@ -102,8 +102,7 @@ class Wrong(Weaver):
     ],
     ids=str,
 )
-def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) -> None:
-    """Whether it is the caller's action that is refused, or that of the policy inside."""
+def test_a_refused_call_leaves_worlds_and_memory(returned: Any, message: str) -> None:
     policy = Wrong(returned)
     batch: Any = posse.batch(SHORT, WORLDS, seed=1, target_policy=policy)
     vector: Any = gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy)
@@ -119,6 +118,8 @@ def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) ->
             before, memory = inner.arrays.copy(), inner.memory
             with pytest.raises(ValueError, match=words):
                 env.step(wrong)
+            with pytest.raises(ValueError, match="would start in"):
+                env.reset(options={"tracker_pose": np.zeros((SHORT.num_trackers, 3))})
             assert inner.memory is memory
             assert all(np.array_equal(*both) for both in zip(before, inner.arrays, strict=True))
 
