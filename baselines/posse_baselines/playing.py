@@ -135,13 +135,15 @@ class Recorder:
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
-        self._lengths[~self.over] += 1
         ended = ~self.over & (terminated | truncated)
         if ended.any():
+            self._lengths[ended] = self.steps
             for name in self.batch.metrics():
                 column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
                 column[ended] = infos[f"metrics/{name}"][ended]
             self.over |= ended
+        if not self._names:
+            return done
         terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
         if isinstance(self.batch, PairedBatch):
             actions, every = self.batch.everyone
@@ -160,11 +162,10 @@ class Recorder:
         return done
 
     def _keep_frame(self, observations: FloatArray) -> None:
-        state = self.batch.state
+        state = self.batch.state if self._names else {}  # to read it takes longer than to step a hundred worlds
         poses = {"tracker_pose": "tracker", "target_pose": "world"}
         self._keep({name: poses_of(state, who) for name, who in poses.items() if name in self._names})
-        self._keep({name: state[name].copy() for name in self._names if name in state})
-        self._keep({"observations": observations})
+        self._keep({name: state[name].copy() for name in self._names if name in state} | {"observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
         """Keep the rows that were asked for by name, or by the part of the name before the slash."""
@@ -179,7 +180,8 @@ class Recorder:
         for name, values in self._metrics.items():
             now[name][self.over] = values[self.over]
         arrays = {name: np.stack(rows) for name, rows in self._rows.items()}
-        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, self._lengths.copy(), now)
+        lengths = np.where(self.over, self._lengths, self.steps)
+        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, lengths, now)
 
 
 def poses_of(state: Mapping[str, Array], who: str) -> Array:
