@@ -202,12 +202,13 @@ def kernel_of(declarations: Declarations) -> Callable[..., int]:
     number of those whose episodes are over. It is compiled again when a value that a user's function reaches has
     changed.
     """
-    check_functions(declarations)
-    return _kernel_of(declarations, stamp(*filter(callable, generated_for(declarations))))
+    added = (function for group in declarations for each in group if not each.built_in for function in each.functions)
+    return _kernel_of(declarations, stamp(*added))
 
 
 @functools.cache
 def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
+    check_functions(declarations)
     made = generated_for(declarations)
 
     @kernel
