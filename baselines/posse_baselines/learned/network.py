@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from posse.numeric import MOST_THREADS, ONE, ZERO, FloatArray, OwnArrays, compiled, kernel, over_worlds
+from posse.numeric import MOST_THREADS, ONE, WIDTH, ZERO, FloatArray, OwnArrays, kernel, load, over_worlds, store
 from posse_baselines.policy import PolicyError
 
 LIMIT: Final = np.float32(10.0)
@@ -73,23 +73,33 @@ class Network(OwnArrays):
 
     def layers(self) -> Layers:
         """Return the network as :func:`forward` reads it."""
+        weights, biases = [], []
+        for weight, bias in zip(self.weights, self.biases, strict=True):
+            rows = -len(bias) % WIDTH  # of zeros, to whole blocks
+            blocks = np.pad(weight, ((0, rows), (0, 0))).reshape(-1, WIDTH, weight.shape[1])
+            weights.append(np.array(blocks.swapaxes(1, 2), order="C"))
+            biases.append(np.pad(bias, (0, rows)))
         return Layers(
             np.array(self.mean),
             np.array(self.scale),
-            tuple(np.array(weight.T, order="C") for weight in self.weights),
-            tuple(map(np.array, self.biases)),
+            tuple(weights),
+            tuple(biases),
+            self.outputs,
             self.activation == "tanh",
             self.output == "tanh",
         )
 
 
 class Layers(NamedTuple):
-    """A network as the kernel reads it: weights lie input by input, so that the inner loop vectorises."""
+    """A network as the kernel reads it, in blocks of eight neurons."""
 
     mean: FloatArray
     scale: FloatArray
     weights: tuple[FloatArray, ...]
+    """(blocks, inputs, 8) of each layer."""
     biases: tuple[FloatArray, ...]
+    """(8 blocks,) of each layer."""
+    outputs: int
     hyperbolic: bool
     squashed: bool
 
@@ -99,7 +109,7 @@ def forward(network: Layers, inputs: FloatArray) -> FloatArray:
 
     Each row is computed alone, so that it never depends on the others: the rounding of a matrix library does.
     """
-    outputs = np.empty((len(inputs), len(network.biases[-1])), np.float32)
+    outputs = np.empty((len(inputs), network.outputs), np.float32)
     scratch = np.empty((MOST_THREADS, 2, max(map(len, (network.mean, *network.biases)))), np.float32)
     # The threads share out rows as if each were a world of one tracker.
     over_worlds(_forward_rows, (network, inputs, scratch, outputs), len(inputs), 1)
@@ -118,7 +128,11 @@ def _forward_rows(
             x[k] = min(max(normalised, -LIMIT), LIMIT)
         for layer in range(last + 1):
             weights, biases = network.weights[layer], network.biases[layer]
-            _add_products(x[: len(weights)], weights, biases, y)
+            for block in range(len(weights)):
+                total = load(biases, WIDTH * block)
+                for i in range(weights.shape[1]):
+                    total = total + x[i] * load(weights[block, i], 0)
+                store(y, WIDTH * block, total)
             if layer < last:
                 for j in range(len(biases)):
                     y[j] = np.float32(math.tanh(y[j])) if network.hyperbolic else max(y[j], ZERO)
@@ -126,20 +140,3 @@ def _forward_rows(
         for j in range(outputs.shape[1]):
             out = np.float32(math.tanh(x[j])) if network.squashed else x[j]
             outputs[r, j] = min(max(out, -ONE), ONE)
-
-
-@compiled
-def _add_products(x: FloatArray, weights: FloatArray, biases: FloatArray, y: FloatArray) -> None:
-    """Write biases + weights x to y; weights (inputs, outputs) are added four inputs at a time."""
-    count, rest = len(biases), len(x) // 4 * 4
-    for j in range(count):
-        y[j] = biases[j]
-    for i in range(0, rest, 4):
-        p, q, r, s = x[i], x[i + 1], x[i + 2], x[i + 3]
-        a, b, c, d = weights[i], weights[i + 1], weights[i + 2], weights[i + 3]
-        for j in range(count):
-            y[j] = y[j] + p * a[j] + q * b[j] + r * c[j] + s * d[j]
-    for i in range(rest, len(x)):
-        p, a = x[i], weights[i]
-        for j in range(count):
-            y[j] += p * a[j]

@@ -6,7 +6,7 @@ distribution of work over threads. It depends on no other room, and every room m
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records, record_type
 from posse.numeric.compile import UNCOMPILED, compiled, kernel
-from posse.numeric.lanes import WIDTH, Lanes, Mask, choose, eight, greater, lesser, root
+from posse.numeric.lanes import WIDTH, Lanes, Mask, choose, eight, greater, lesser, load, root, store
 from posse.numeric.threads import MOST_THREADS, over_worlds
 
 __all__ = [
@@ -30,7 +30,9 @@ __all__ = [
     "greater",
     "kernel",
     "lesser",
+    "load",
     "over_worlds",
     "record_type",
     "root",
+    "store",
 ]
