@@ -168,6 +168,8 @@ def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
     Trackers are sorted by number, ``tracker_0`` first; a target that is an agent is left out.
     """
     count = sum(name.startswith("tracker_") for name in observations)
+    if count == 0:
+        raise ValueError(f"no tracker among {list(observations)}: give the observations of an episode that goes on")
     return np.stack([np.asarray(observations[f"tracker_{i}"], np.float32) for i in range(count)])[None]
 
 

@@ -226,7 +226,7 @@ class Beliefs(Minds):
         surprise = _wrap(angle - np.arctan2(w["heading_sin"], w["heading_cos"]))
         speed = np.full(self.rows, s.target_speed)
         if s.target_is_agent:
-            speed = np.clip(np.abs(velocity), s.target_least_speed, s.target_speed)
+            speed = np.minimum(np.abs(velocity), s.target_speed)
         goal = _complex(np.stack([w["goal_cos"], w["goal_sin"]], axis=-1))
         unforeseen = first | (np.abs(surprise) > max(_AGREES, 3.0 * noise))
         if s.target_motion == "smart":

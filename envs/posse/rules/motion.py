@@ -141,8 +141,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     take_commands(c, w, actions, worlds.command[e], s)
     if c.target_agent != 0:
         action = actions[c.num_trackers]
-        share, least = HALF * (action[0] + ONE), c.target_least_speed
-        w.speed = least + share * (c.target_speed - least)
+        w.speed = HALF * (action[0] + ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate
     else:
         w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, s)

@@ -102,9 +102,6 @@ class Scenario:
     )
     target_speed: float = setting(0.6, "speed of the target; an agent's greatest", "m/s", 0, 1000)
     target_turn_rate: float = setting(1.0, "greatest turn rate of the target", "rad/s", SMALL, WIDE)
-    target_least_speed: float = setting(
-        0.0, "least speed of a target that is an agent, at most target_speed", "m/s", 0, 1000
-    )
 
     # The formation
     formation: str = setting(
@@ -407,8 +404,6 @@ def _in_team(s: Scenario) -> _Conflicts:
     if s.target_speed > 0.9999 * slowest:
         why = "by 0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
         yield "target_speed", f"it must be below tracker_speed={slowest:g}, {why}"
-    if s.target_least_speed > s.target_speed:
-        yield "target_least_speed", f"it must be at most target_speed={s.target_speed:g}"
     if s.target_speed < SMALL and s.target_motion != "constant":
         yield "target_speed", f"only a target of constant motion may rest: choose at least {SMALL:g}"
     for speed, rate in zip(s.tracker_speeds, s.tracker_turn_rates, strict=False):

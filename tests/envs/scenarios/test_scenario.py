@@ -29,7 +29,6 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"target_speed": 1.0}, "0.01 %"),
     ({"target_speed": 1e-300, "target_motion": "smart"}, "constant"),
     ({"wheel_base": 3.0}, "lower it, or tracker_turn_rate"),
-    ({"target_least_speed": 0.7}, "at most target_speed=0.6"),
     ({"formation_distance": 0.3}, "target"),
     ({"formation_spacing": 0.6}, "tolerance"),
     ({"formation_spacing": 0.9, "robot_radius": 0.5, "formation_distance": 2.0}, "robot_radius"),
