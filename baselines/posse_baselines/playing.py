@@ -19,7 +19,8 @@ from posse_baselines.registry import Target
 Array = npt.NDArray[Any]
 
 _STEPS: Final = ("actions", "rewards", "terms", "score", "terminated", "truncated", "annotations")
-_FRAMES: Final = ("observations", "tracker_pose", "target_pose")
+_POSES: Final = {"tracker_pose": "tracker", "target_pose": "world"}
+_FRAMES: Final = ("observations", *_POSES)
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,8 @@ class Recorder:
 
     def __init__(self, batch: Batch, record: Iterable[str] = ()) -> None:
         self.batch = batch
-        names, known = tuple(record), (*_FRAMES, *_STEPS, "state", *batch.state)
+        names, state = tuple(record), tuple(batch.state)
+        known = (*_FRAMES, *_STEPS, "state", *state)
         for name in names:
             if name not in known:
                 raise ValueError(f"record={name!r} is unknown; names are: {', '.join(known)}")
@@ -114,8 +116,9 @@ class Recorder:
                     f"record={name!r} is not possible with autoreset='same_step', which overwrites the last state of "
                     "an episode: make the batch with autoreset='disabled' or 'next_step'"
                 )
-        groups = {"state": tuple(batch.state), "terms": ("reward",), "annotations": ("annotation",)}
+        groups = {"state": state, "terms": ("reward",), "annotations": ("annotation",)}
         self._names = dict.fromkeys(each for name in names for each in groups.get(name, (name,)))
+        self._reads_state = not self._names.keys().isdisjoint((*_POSES, *state))
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
@@ -135,9 +138,9 @@ class Recorder:
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
+        self._lengths += ~self.over
         ended = ~self.over & (terminated | truncated)
         if ended.any():
-            self._lengths[ended] = self.steps
             for name in self.batch.metrics():
                 column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
                 column[ended] = infos[f"metrics/{name}"][ended]
@@ -162,9 +165,8 @@ class Recorder:
         return done
 
     def _keep_frame(self, observations: FloatArray) -> None:
-        state = self.batch.state if self._names else {}  # to read it takes longer than to step a hundred worlds
-        poses = {"tracker_pose": "tracker", "target_pose": "world"}
-        self._keep({name: poses_of(state, who) for name, who in poses.items() if name in self._names})
+        state = self.batch.state if self._reads_state else {}  # it takes as long as a step of a hundred worlds
+        self._keep({name: poses_of(state, who) for name, who in _POSES.items() if name in self._names})
         self._keep({name: state[name].copy() for name in self._names if name in state} | {"observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
@@ -180,8 +182,7 @@ class Recorder:
         for name, values in self._metrics.items():
             now[name][self.over] = values[self.over]
         arrays = {name: np.stack(rows) for name, rows in self._rows.items()}
-        lengths = np.where(self.over, self._lengths, self.steps)
-        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, lengths, now)
+        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, self._lengths.copy(), now)
 
 
 def poses_of(state: Mapping[str, Array], who: str) -> Array:
