@@ -17,7 +17,7 @@ from posse.engine.batch import Batch, of_batch
 from posse.engine.opponent import TargetPolicy, batch
 from posse.numeric import FloatArray
 from posse.rendering import RENDER_MODES
-from posse.scenarios import Scenario, get_scenario
+from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.scenarios.setting import check_choice
 from posse.signals.layout import ObservationLayout, StateLayout
 
@@ -118,6 +118,9 @@ class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
+        for name in ("num_worlds", "autoreset", "num_threads"):
+            if name in settings:
+                raise ScenarioError(f"{name}= is for many worlds: use posse.batch or gymnasium.make_vec")
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._no_info: dict[str, Any] = dict.fromkeys(self.batch._info, 0.0)
         self.state_layout = StateLayout(self.scenario)

@@ -33,7 +33,7 @@ from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Record
 from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, WorldArrays
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.scenarios.setting import SPLITS, check_choice, check_count
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
@@ -57,7 +57,7 @@ class Batch(OwnArrays):
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
-        scenario: Settings of the worlds.
+        scenario: Settings of the worlds, or their name.
         num_worlds: E, at least 1.
         seed: Seed of all random draws, in [0, 2**63). World i of a seed is the same world in every
             batch.
@@ -82,7 +82,7 @@ class Batch(OwnArrays):
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: str | Scenario,
         num_worlds: int,
         *,
         seed: int = 0,
@@ -92,7 +92,7 @@ class Batch(OwnArrays):
         num_threads: int | None = None,
         clip_actions: bool = False,
     ) -> None:
-        self.scenario = scenario
+        self.scenario = scenario = get_scenario(scenario)
         self.num_worlds = check_count("num_worlds", num_worlds, 1)
         self.first_world = check_count("first_world", first_world, 0)
         check_count("first_world + num_worlds - 1", self.first_world + self.num_worlds - 1, 0)

@@ -48,7 +48,7 @@ class PairedBatch(Batch):
     in :class:`Batch`; copies of the worlds are a plain batch, and a snapshot has no memory of the policy.
 
     Args:
-        scenario: Settings of the worlds; their target becomes an agent if one side is moved from outside.
+        scenario: Settings of the worlds, or a name; the target becomes an agent if one side is moved from outside.
         num_worlds: E, at least 1.
         inside: Moves the others; ``begin``, ``act`` and ``restart`` as :class:`TargetPolicy` has them, with a row for
             each robot that it moves. The team-mates of a tracker are moved by a policy of the whole team, whose action
@@ -67,7 +67,7 @@ class PairedBatch(Batch):
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: str | Scenario,
         num_worlds: int,
         inside: TargetPolicy,
         *,
@@ -75,7 +75,7 @@ class PairedBatch(Batch):
         silent: bool = False,
         **settings: Any,
     ) -> None:
-        one = not isinstance(outside, str)
+        scenario, one = get_scenario(scenario), not isinstance(outside, str)
         if one and check_count("outside", outside, 0) >= scenario.num_trackers:
             raise ScenarioError(f"outside={outside} is not in the team: trackers are 0 to {scenario.num_trackers - 1}")
         if not one:

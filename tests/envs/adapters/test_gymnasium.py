@@ -49,3 +49,9 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
         plain.step({agent: MOTIONS[number] for agent, number in chosen.items()})
         discrete.step(chosen)
         assert np.array_equal(plain.state(), discrete.state())
+
+
+def test_settings_of_many_worlds_are_refused() -> None:
+    for make in (posse.parallel_env, lambda **settings: gymnasium.make(TEAM, **settings)):
+        with pytest.raises(posse.ScenarioError, match="num_worlds= is for many worlds"):
+            make(num_worlds=4)
