@@ -287,11 +287,3 @@ def fetch(array: npt.NDArray[Any], offset: int) -> None:
 def load_fields(record: Record, offset: int) -> Lanes:
     """Return the eight float32 from ``offset`` bytes into a record on."""
     return np.frombuffer(record.tobytes(), np.float32, WIDTH, offset)
-
-
-@_accesses(_write, types.Record, types.none, _LANES)
-def store_fields(record: Record, offset: int, value: Lanes) -> None:
-    """Write eight fields, float32, from ``offset`` bytes into a record on."""
-    for name, (_, at, *_) in record.dtype.fields.items():
-        if offset <= at < offset + 4 * WIDTH:
-            record[name] = value[(at - offset) // 4]

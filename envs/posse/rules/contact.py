@@ -53,16 +53,16 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 @compiled
 def free_of_robots(
-    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, s: Record, count: int
+    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, s: Record
 ) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 
-    The positions of ``count`` robots are in ``s.near_x`` and ``s.near_y``; the robot itself may be among them.
+    The positions of all robots, itself among them, are in ``s`` (:func:`posse.rules.discs.lay_out_robots`).
     """
     reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
-    for block in range(blocks(count)):
+    for block in range(blocks(c.num_trackers + 1)):
         k = WIDTH * block
-        share = min(share, least(free_share(x, y, dx, dy, load(s.near_x, k), load(s.near_y, k), reach)))
+        share = min(share, least(free_share(x, y, dx, dy, load(s.x, k), load(s.y, k), reach)))
     return np.float32(share)
 
 

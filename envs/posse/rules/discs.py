@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import ONE, WIDTH, FloatArray, Lanes, Record, Records, choose, compiled, eight, greater, lesser, root
+from posse.numeric import ONE, WIDTH, Lanes, Record, Records, choose, compiled, eight, greater, lesser, root
 from posse.numeric.lanes import load, load_fields, store, transpose
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NO_BITS, POSE, Pose
@@ -73,34 +73,9 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 
 @compiled
-def write_block(block: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
-    """Write eight columns, the first of them column ``first``, to at most eight rows."""
-    a, b, c, d, e, f, g, h = block
-    a, b, c, d, e, f, g, h = transpose((a, b, c, d, e, f, g, h))
-    # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, first, rows)
-    _write_row(b, 1, first, rows)
-    _write_row(c, 2, first, rows)
-    _write_row(d, 3, first, rows)
-    _write_row(e, 4, first, rows)
-    _write_row(f, 5, first, rows)
-    _write_row(g, 6, first, rows)
-    _write_row(h, 7, first, rows)
-
-
-@compiled
-def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
-    if lane < len(rows):
-        store(rows[lane], first, row)
-
-
-@compiled
-def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Write the positions of all discs: trackers, then the target, then obstacles."""
+def lay_out_robots(c: Record, w: Record, trackers: Records, s: Record) -> None:
+    """Write the positions of all robots: trackers, then the target."""
     n = c.num_trackers
-    # Padding first: a load of a block that covers two stores would have to wait for them.
-    store(s.x, num_discs(c), eight(FAR))
-    store(s.y, num_discs(c), eight(FAR))
     for block in range(blocks(n + 1)):
         j = WIDTH * block
         pose = Pose(*columns(trackers, j, n, POSE))
@@ -108,8 +83,17 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))
         store(s.y, j, choose(tracker, pose.y, choose(target, w.y, FAR)))
+
+
+@compiled
+def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
+    """Write the positions of all discs: trackers, then the target, then obstacles."""
+    # Padding first: a load of a block that covers two stores would have to wait for them.
+    store(s.x, num_discs(c), eight(FAR))
+    store(s.y, num_discs(c), eight(FAR))
+    lay_out_robots(c, w, trackers, s)
     for k, o in enumerate(obstacles):
-        j = n + 1 + k
+        j = c.num_trackers + 1 + k
         s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
 
 

@@ -430,10 +430,6 @@ _SCRATCH: Final[tuple[tuple[str, int | tuple[int, ...]], ...]] = (
     ("worth", 2 * WIDTH),  # value of each direction considered by a smart target
     ("wanted_speed", TEAM),  # commanded by each tracker's action
     ("wanted_turn", TEAM),
-    ("new_pose", (TEAM, WIDTH)),  # of each tracker
-    ("near", ROBOTS),  # numbers of the robots that are near anything, the target last
-    ("near_x", ROBOTS + WIDTH),  # their positions
-    ("near_y", ROBOTS + WIDTH),
     # Observations: eight numbers, one for each of eight worlds.
     ("team_x", (TEAM, WIDTH)),  # of each tracker
     ("team_y", (TEAM, WIDTH)),

@@ -46,9 +46,9 @@ _HEAD: Final = '''"""Functions that posse compiles for the declarations of a sce
 from numpy import float32
 
 from posse.numeric import ZERO, choose, compiled, eight
-from posse.rules.discs import write_block
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
+from posse.signals.views import write_block
 
 # The declared functions:'''
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled
+from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, Records, compiled
 from posse.numeric.lanes import bits, choose, counts, eight, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
@@ -33,6 +33,28 @@ from posse.rules.state import (
     TargetPose,
     WorldArrays,
 )
+
+
+@compiled
+def write_block(block: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
+    """Write eight columns, the first of them column ``first``, to at most eight rows."""
+    a, b, c, d, e, f, g, h = block
+    a, b, c, d, e, f, g, h = transpose((a, b, c, d, e, f, g, h))
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, first, rows)
+    _write_row(b, 1, first, rows)
+    _write_row(c, 2, first, rows)
+    _write_row(d, 3, first, rows)
+    _write_row(e, 4, first, rows)
+    _write_row(f, 5, first, rows)
+    _write_row(g, 6, first, rows)
+    _write_row(h, 7, first, rows)
+
+
+@compiled
+def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
+    if lane < len(rows):
+        store(rows[lane], first, row)
 
 
 class Observers(NamedTuple):
