@@ -329,9 +329,6 @@ def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
     return REWARD_TERMS.decorator(unit=unit, target=target)
 
 
-_STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Metric(Declaration):
     """One metric of an episode; :func:`metric` describes the attributes."""
@@ -340,10 +337,6 @@ class Metric(Declaration):
     signatures: ClassVar = {
         "function": ("(c, w) or (c, w, t) or (c, w, trackers) or (c, w, trackers, slots) or (s, w)", "a number")
     }
-
-    choices: ClassVar = {"per": tuple(_STEPS)}
-
-    per: str
 
     @property
     def summed(self) -> bool:
@@ -362,22 +355,22 @@ class Metric(Declaration):
             if found.shape != worlds.shape:
                 raise self.error(f"it returned an array of shape {found.shape}, not {worlds.shape}, one for each world")
             return found
-        total: npt.NDArray[np.float64] = np.asarray(worlds[self.sum_name], np.float64)
-        steps = _STEPS[self.per]
-        return total if steps is None else total / np.maximum(worlds[steps], 1)
+        steps = worlds["tracker_steps" if "t" in parameters_of(self.function) else "step"]
+        mean: npt.NDArray[np.float64] = worlds[self.sum_name] / np.maximum(steps, 1)
+        return mean
 
 
-def metric(unit: str, *, per: str = "step") -> Decorator:
+def metric(unit: str) -> Decorator:
     """Declare a function as a metric of an episode with its name; its docstring is the meaning.
 
-    Its value is added in each control step to a sum, the field ``<name>_sum`` of the world's record, which is divided
-    at the end of the episode. The parameters of the function determine what is summed:
+    The metric is the mean of its values in an episode, from their sum, the field ``<name>_sum`` of the world's record.
+    The parameters of the function determine of what:
 
     ========================= ========================================================================
-    (c, w)                    a value of the world
-    (c, w, t)                 a value of each working tracker
-    (c, w, trackers)          a value of the team
-    (c, w, trackers, slots)   a value of the team, with the slots
+    (c, w)                    a value of the world, in each control step
+    (c, w, t)                 a value of each working tracker, in each control step
+    (c, w, trackers)          a value of the team, in each control step
+    (c, w, trackers, slots)   the same, with the slots
     (s, w)                    nothing: called from Python with the scenario and the records of all
                               worlds, it returns the metric of each, (E,)
     ========================= ========================================================================
@@ -387,18 +380,8 @@ def metric(unit: str, *, per: str = "step") -> Decorator:
 
     Args:
         unit: Unit of the metric.
-        per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
-            control steps of all working trackers; ``"episode"``: 1.
     """
-    return METRICS.decorator(unit=unit, per=per)
-
-
-class Memory(NamedTuple):
-    """A state variable of a motion: a float32 of the world's record, 0 at the start, and part of the global state."""
-
-    name: str
-    unit: str
-    meaning: str
+    return METRICS.decorator(unit=unit)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -415,7 +398,7 @@ class TargetMotion(Declaration):
     }
 
     draw: Function | None
-    memory: Sequence[Memory]
+    memory: Sequence[str]
     mirrored: bool
 
     def __post_init__(self) -> None:
@@ -424,15 +407,15 @@ class TargetMotion(Declaration):
         given: Any = self.memory
         if not isinstance(self.mirrored, bool):
             raise self.error(f"mirrored={self.mirrored!r} must be True or False")
-        if not isinstance(given, (list, tuple)) or not all(isinstance(each, Memory) for each in given):
-            raise self.error(f"memory={given!r} must be a list of posse.Memory")
+        if not isinstance(given, (list, tuple)):
+            raise self.error(f"memory={given!r} must be a list of names")
         for each in given:
-            if not isinstance(each.name, str) or not each.name.isidentifier() or keyword.iskeyword(each.name):
-                raise self.error(f"invalid name {each.name!r} of a memory: use a name that Python allows")
+            if not isinstance(each, str) or not each.isidentifier() or keyword.iskeyword(each):
+                raise self.error(f"invalid name {each!r} of a memory: use a name that Python allows")
 
 
 def target_motion(
-    name: str, *, draw: Function | None = None, memory: Sequence[Memory] = (), mirrored: bool = True
+    name: str, *, draw: Function | None = None, memory: Sequence[str] = (), mirrored: bool = True
 ) -> Decorator:
     """Declare a function as a target motion; its docstring is the meaning.
 
@@ -444,7 +427,7 @@ def target_motion(
     Args:
         name: What ``target_motion`` of a scenario calls it.
         draw: A function ``(c, w)`` that draws the parameters of an episode.
-        memory: Its state variables, fields of ``w``.
+        memory: Names of its state variables, float32 fields of ``w``: 0 at the start, and part of the global state.
         mirrored: Whether the goal is mirrored near walls; not needed by a motion that avoids them.
     """
     return TARGET_MOTIONS.decorator(name=name, draw=draw, memory=memory, mirrored=mirrored)

@@ -251,9 +251,9 @@ def world_record(declared: Declarations) -> np.dtype[Any]:
     fields = {**dict(_WORLD), **sums}
     for motion in declared.motions:
         for memory in motion.memory:
-            if memory.name in fields:
-                raise motion.error(f"a world has a field {memory.name!r}: choose another name for this memory")
-            fields[memory.name] = _F
+            if memory in fields:
+                raise motion.error(f"a world has a field {memory!r}: choose another name for this memory")
+            fields[memory] = _F
     return record_type(*fields.items())
 
 
@@ -262,8 +262,6 @@ FIX_RECORD: Final = record_type(*((name, _F) for name in Fix._fields))
 
 TRACKER: Final = record_type(
     *((name, _F) for name in Pose._fields),
-    ("per_speed", _F),
-    ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn")
     *((name, _I) for name in Condition._fields),
     ("slot", _I),  # number of the slot that it occupies; -1: none
@@ -342,11 +340,7 @@ class WorldArrays(NamedTuple):
         kept = 0 if perfect_radio(scenario) else n
         delay = scenario.radio_delay + 1
         tracker = np.zeros((num_worlds, n), TRACKER)
-        for limit, inverse, values in (
-            ("max_speed", "per_speed", scenario.tracker_speeds),
-            ("max_turn_rate", "per_turn_rate", scenario.tracker_turn_rates),
-        ):
-            tracker[limit], tracker[inverse] = values, 1 / np.array(values)
+        tracker["max_speed"], tracker["max_turn_rate"] = scenario.tracker_speeds, scenario.tracker_turn_rates
         return cls(
             world=np.zeros(num_worlds, world_record(Declarations.of(scenario))),
             tracker=tracker,
@@ -408,47 +402,39 @@ ROBOTS: Final = TEAM + WIDTH
 DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
 """Length of rows of robots, obstacles and padding."""
 BEAMS: Final = 64
-_LINE: Final = 16  # float32 of a cache line
 
-_SCRATCH: Final[tuple[tuple[str, int | tuple[int, ...]], ...]] = (
+SCRATCH: Final = record_type(
     # Discs: trackers, the target, obstacles.
-    ("x", DISCS),  # common frame, m
-    ("y", DISCS),
-    ("radius", DISCS),  # m
-    ("index", ROBOTS),  # 0, 1, 2, …
+    ("x", _F, DISCS),  # common frame, m
+    ("y", _F, DISCS),
+    ("radius", _F, DISCS),  # m
+    ("index", _F, ROBOTS),  # 0, 1, 2, …
     # The sonar's beams.
-    ("beam_cos", BEAMS),
-    ("beam_sin", BEAMS),
-    ("reading", BEAMS),  # m
+    ("beam_cos", _F, BEAMS),
+    ("beam_sin", _F, BEAMS),
+    ("reading", _F, BEAMS),  # m
     # Trackers.
-    ("gap", TEAM),  # clearance to the nearest disc, m
-    ("excess", TEAM),  # above 0 only if nothing is near
-    ("slot", TEAM),  # number of the nearest slot, or of the nearest free one
-    ("slot_distance", TEAM),  # distance to it, m
-    ("slot_distance2", TEAM),  # squared, m²
+    ("gap", _F, TEAM),  # clearance to the nearest disc, m
+    ("excess", _F, TEAM),  # above 0 only if nothing is near
+    ("slot", _F, TEAM),  # number of the nearest slot, or of the nearest free one
+    ("slot_distance", _F, TEAM),  # distance to it, m
+    ("slot_distance2", _F, TEAM),  # squared, m²
     # Motion.
-    ("worth", 2 * WIDTH),  # value of each direction considered by a smart target
-    ("wanted_speed", TEAM),  # commanded by each tracker's action
-    ("wanted_turn", TEAM),
+    ("worth", _F, 2 * WIDTH),  # value of each direction considered by a smart target
+    ("wanted_speed", _F, TEAM),  # commanded by each tracker's action
+    ("wanted_turn", _F, TEAM),
     # Observations: eight numbers, one for each of eight worlds.
-    ("team_x", (TEAM, WIDTH)),  # of each tracker
-    ("team_y", (TEAM, WIDTH)),
-    ("placed", (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
-    ("placed_at", (TEAM, WIDTH)),  # its distance, m
+    ("team_x", _F, (TEAM, WIDTH)),  # of each tracker
+    ("team_y", _F, (TEAM, WIDTH)),
+    ("placed", _F, (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
+    ("placed_at", _F, (TEAM, WIDTH)),  # its distance, m
 )
-_PADDING: Final = -sum(math.prod(np.atleast_1d(shape)) for _, shape in _SCRATCH) % _LINE
-
-SCRATCH: Final = np.dtype(
-    (np.record, [(name, _F, np.atleast_1d(shape)) for name, shape in (*_SCRATCH, ("padding", _PADDING))])
-)
-"""Scratch memory of a thread, of whole cache lines, so that no two threads write to one."""
+"""Scratch memory of a thread."""
 
 
 def new_scratch(scenario: Scenario, threads: int) -> Records:
     """Return (threads,) :data:`SCRATCH`, with what is the same in all worlds of a scenario."""
-    memory = np.zeros(threads * SCRATCH.itemsize + 4 * _LINE, np.uint8)
-    start = -memory.ctypes.data % (4 * _LINE)
-    scratch = memory[start : start + threads * SCRATCH.itemsize].view(SCRATCH)
+    scratch = np.zeros(threads, SCRATCH)
     scratch["index"], scratch["radius"] = np.arange(ROBOTS), scenario.robot_radius
     for name, values in zip(("beam_cos", "beam_sin"), beam_directions(scenario), strict=True):
         scratch[name][:, : scenario.sonar_beams] = values

@@ -13,8 +13,9 @@ the sums of metrics are not included.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -102,27 +103,17 @@ class ObservationLayout:
 
 _Values = npt.NDArray[Any]
 
-_POSE: Final = {"x": "m", "y": "m", "heading_cos": "1", "heading_sin": "1", "speed": "m/s", "turn_rate": "rad/s"}
-_FIX: Final = {"fix_x": "m", "fix_y": "m", "fix_cos": "1", "fix_sin": "1", "fix_frame_cos": "1", "fix_frame_sin": "1"}
-_FRAME: Final = {"frame_cos": "1", "frame_sin": "1", "goal_cos": "1", "goal_sin": "1"}
-
-
-class StateEntry(NamedTuple):
-    """One named part of the state vector: a field of the records, in physical units."""
-
-    name: str
-    unit: str
-    meaning: str
-    field: str
-    """Its name in :meth:`posse.rules.state.WorldArrays.by_name`."""
-    shape: tuple[int, ...] = ()
+_POSE: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
+_FIX: Final = ("fix_x", "fix_y", "fix_cos", "fix_sin", "fix_frame_cos", "fix_frame_sin")
+_ERRORS: Final = ("odometry_x", "odometry_y", "odometry_heading")
 
 
 class StateLayout:
-    """The entries of a scenario's state vector.
+    """The entries of a scenario's state vector, in physical units; control steps are times in s.
 
     Attributes:
-        entries: Every :class:`StateEntry`, in order.
+        fields: Name of every entry, in order, and its field of :meth:`posse.rules.state.WorldArrays.by_name`.
+        shapes: Shape of each, by name.
         size: S, length of the vector.
         offsets: Index of the first number of each entry, by name.
     """
@@ -130,28 +121,28 @@ class StateLayout:
     def __init__(self, scenario: Scenario) -> None:
         self._control_step = scenario.control_step
         one = WorldArrays.allocate(scenario, 1).by_name()
-        shaped = [entry._replace(shape=one[entry.field].shape[1:]) for entry in _entries(scenario)]
         # A scenario without obstacles, messages or a radio that fails has nothing to say of them.
-        self.entries = tuple(entry for entry in shaped if 0 not in entry.shape)
-        ends = np.cumsum([int(np.prod(entry.shape)) for entry in self.entries]).tolist()
-        self.offsets = dict(zip((entry.name for entry in self.entries), [0, *ends], strict=False))
+        self.fields = {name: field for name, field in _entries(scenario).items() if one[field].size}
+        self.shapes = {name: one[field].shape[1:] for name, field in self.fields.items()}
+        ends = np.cumsum([math.prod(shape) for shape in self.shapes.values()]).tolist()
+        self.offsets = dict(zip(self.fields, [0, *ends], strict=False))
         self.size: int = ends[-1]
 
     def vector(self, arrays: WorldArrays) -> FloatArray:
         """Return the states of a batch's worlds, a new array (E, S) float32."""
         fields = arrays.by_name()
-        parts = [self._read(entry, fields).reshape(len(arrays.world), -1) for entry in self.entries]
+        parts = [self._read(field, fields).reshape(len(arrays.world), -1) for field in self.fields.values()]
         return np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind")
 
-    def _read(self, entry: StateEntry, fields: Mapping[str, _Values]) -> _Values:
-        """Return the values of an entry, (E, *shape)."""
-        values, array = fields[entry.field], entry.field.partition("_")[0]
-        is_step = entry.unit == "s" and values.dtype == np.int32
+    def _read(self, field: str, fields: Mapping[str, _Values]) -> _Values:
+        """Return the values of a field, (E, *shape)."""
+        values, array = fields[field], field.partition("_")[0]
+        is_step = values.dtype == np.int32 and field.endswith(("_step", "_at", "_from"))
         if is_step:
             values = np.where((values < 0) | (values >= NEVER), -1.0, values * self._control_step)
         # What was never heard or sent is "none", whatever an earlier episode left there.
         none = -1.0 if is_step else 0.0
-        if array == "heard" and entry.name != "heard_message":
+        if array == "heard" and field != "heard_message":
             values = np.where(fields["heard_step"] >= 0, values, none)
         if array == "broadcast":
             values = np.where(fields["broadcast_sent"] != 0, values, none)
@@ -166,46 +157,34 @@ class StateLayout:
         if vectors.shape[-1] != self.size:
             raise ValueError(f"states of shape {vectors.shape} do not fit: S = {self.size}")
         views = {}
-        for entry in self.entries:
-            start = self.offsets[entry.name]
-            part = vectors[..., start : start + int(np.prod(entry.shape))]
-            views[entry.name] = part.reshape((*vectors.shape[:-1], *entry.shape))
+        for name, shape in self.shapes.items():
+            part = vectors[..., self.offsets[name] : self.offsets[name] + math.prod(shape)]
+            views[name] = part.reshape((*vectors.shape[:-1], *shape))
         return views
 
 
-def _errors(s: Scenario) -> dict[str, str]:
-    """Return the errors of a pose that drifts, with their units."""
-    return {"odometry_x": "m", "odometry_y": "m", "odometry_heading": "rad"} if s.drifts else {}
+def _entries(s: Scenario) -> dict[str, str]:
+    """Return every entry, in order, with its field.
 
-
-def _entries(s: Scenario) -> list[StateEntry]:
-    """Return every entry, in order; control steps become times in s."""
+    A time is -1 where there is none. Commands, messages and what was sent come newest first; what was heard, by
+    receiver and sender.
+    """
     memory = [each for motion in Declarations.of(s).motions for each in motion.memory]
-    rows = [
-        ("time", "s", "since the start", "world_step"),
-        *((f"target_{k}", unit, f"the target's {k}", f"world_{k}") for k, unit in {**_POSE, **_FRAME}.items()),
-        *((each.name, each.unit, each.meaning, f"world_{each.name}") for each in memory),
-        ("next_break", "s", "when the nearest tracker breaks; -1: never", "world_break_step"),
-        ("breaks_left", "count", "trackers that are still to break", "world_breaks_left"),
-        *((f"tracker_{k}", unit, f"each tracker's {k}", f"tracker_{k}") for k, unit in {**_POSE, **_FIX}.items()),
-        ("tracker_fix_vx", "m/s", "velocity from its fixes", "tracker_fix_vx"),
-        ("tracker_fix_vy", "m/s", "velocity from its fixes", "tracker_fix_vy"),
-        ("tracker_fix_time", "s", "when its fix was taken; -1: it has none", "tracker_fix_step"),
-        ("tracker_broken_at", "s", "when it broke; -1: it works", "tracker_broken_at"),
-        ("tracker_breaks_at", "s", "when it will break; -1: never", "tracker_breaks_at"),
-        ("tracker_sensor_dead_from", "s", "start of its sensor's outage; -1: none", "tracker_sensor_dead_from"),
-        ("tracker_radio_dead_from", "s", "start of its radio's outage; -1: none", "tracker_radio_dead_from"),
-        ("tracker_sees", "1", "1 while it sees the target", "tracker_sees"),
-        *((k, u, "error of each own pose", k) for k, u in _errors(s).items()),
-        ("command", "1", "actions not yet executed, newest first", "command"),
-        *((f"obstacle_{k}", "m", f"each obstacle's {k}", f"obstacle_{k}") for k in ("x", "y", "radius")),
-        ("message", "1", "policies' messages, newest first", "message"),
-        ("heard_message", "1", "last received: receiver, sender", "heard_message"),
-        ("heard_time", "s", "when that was sent; -1: never", "heard_step"),
-        *((f"heard_{k}", unit, "of the sender, as last received", f"heard_{k}") for k, unit in _POSE.items()),
-        ("sent", "1", "1: a message was sent; in flight, newest first", "broadcast_sent"),
-        ("sent_fix_time", "s", "time of the fix sent; -1: none", "broadcast_fix_step"),
-        *((f"sent_{k}", unit, "as sent, newest first", f"broadcast_{k}") for k, unit in {**_POSE, **_FIX}.items()),
-        *((f"sent_{k}", u, "error of the pose sent", f"broadcast_{k}") for k, u in _errors(s).items()),
-    ]
-    return [StateEntry(*row) for row in rows]
+    errors = _ERRORS if s.drifts else ()
+    return {
+        "time": "world_step",
+        **{f"target_{k}": f"world_{k}" for k in (*_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin")},
+        **{name: f"world_{name}" for name in memory},
+        "next_break": "world_break_step",
+        "breaks_left": "world_breaks_left",
+        **{f"tracker_{k}": f"tracker_{k}" for k in (*_POSE, *_FIX, "fix_vx", "fix_vy")},
+        "tracker_fix_time": "tracker_fix_step",
+        **{k: k for k in ("tracker_broken_at", "tracker_breaks_at", "tracker_sensor_dead_from")},
+        **{k: k for k in ("tracker_radio_dead_from", "tracker_sees", *errors, "command")},
+        **{k: k for k in ("obstacle_x", "obstacle_y", "obstacle_radius", "message", "heard_message")},
+        "heard_time": "heard_step",
+        **{f"heard_{k}": f"heard_{k}" for k in _POSE},
+        "sent": "broadcast_sent",
+        "sent_fix_time": "broadcast_fix_step",
+        **{f"sent_{k}": f"broadcast_{k}" for k in (*_POSE, *_FIX, *errors)},
+    }

@@ -16,6 +16,7 @@ from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario
+from posse.signals.reward import effort
 
 Column = npt.NDArray[np.float64]
 
@@ -67,13 +68,13 @@ def recovery_time(s: Scenario, w: Records) -> Column:
     return np.where(w["recovered_at"] >= 0, _time(w["recovered_at"] - w["lost_at"], s), np.nan)
 
 
-@metric("m", per="tracker_step")
+@metric("m")
 def tracking_error(c: Record, w: Record, t: Record) -> np.float32:
     """Mean distance of a working tracker from its own slot, or the nearest free one."""
     return np.float32(t.slot_distance)
 
 
-@metric("1", per="tracker_step")
+@metric("1")
 def time_in_sight(c: Record, w: Record, t: Record) -> np.float32:
     """Share of the working trackers' time with the target in sight of their own sensor."""
     return np.float32(t.sees)
@@ -110,11 +111,10 @@ def least_gap(s: Scenario, w: Records) -> Column:
     return w["least_gap"]
 
 
-@metric("1", per="tracker_step")
+@metric("1")
 def control_effort(c: Record, w: Record, t: Record) -> np.float32:
     """Mean of (V / V_max)² + (ω / ω_max)² over the working trackers."""
-    v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
-    return np.float32(v * v + turn * turn)
+    return effort(c, w, t)
 
 
 @metric("1")

@@ -56,7 +56,7 @@ def _effort_of_target(c: Record, w: Record) -> np.float32:
 @reward_term("1", target=_effort_of_target)
 def effort(c: Record, w: Record, t: Record) -> np.float32:
     """(V / V_max)² + (ω / ω_max)² of the robot's actual motion."""
-    v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
+    v, turn = t.speed / t.max_speed, t.turn_rate / t.max_turn_rate
     return np.float32(v * v + turn * turn)
 
 

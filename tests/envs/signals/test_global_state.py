@@ -30,8 +30,6 @@ FOLLOWS: Final = (
     # from the scenario, always the same
     "tracker_max_speed",
     "tracker_max_turn_rate",
-    "tracker_per_speed",
-    "tracker_per_turn_rate",
     # from the heading's error
     "odometry_cos",
     "odometry_sin",

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.declarations import Memory, target_motion
+from posse.declarations import target_motion
 from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
@@ -21,12 +21,6 @@ _MOST: Final = 0.9
 # constant amplitude and rate could be predicted for ever from a few fixes.
 _AMPLITUDE_WALK: Final = 0.05
 _RATE_WALK: Final = 0.03
-
-_MEMORY: Final = (
-    Memory("weave_amplitude", "rad/s", "of an accelerating target"),
-    Memory("weave_rate", "rad/s", "of an accelerating target"),
-    Memory("weave_phase", "rad", "of an accelerating target"),
-)
 
 
 @target_motion("constant")
@@ -53,7 +47,7 @@ def walked(value: Any, step: Any, low: Any, high: Any) -> np.float32:
     return np.float32(min(max(moved, low), high))
 
 
-@target_motion("accelerating", draw=draw_weave, memory=_MEMORY)
+@target_motion("accelerating", draw=draw_weave, memory=("weave_amplitude", "weave_rate", "weave_phase"))
 def accelerating(c: Record, w: Record) -> None:
     """Turn rate is a sine whose random amplitude and rate walk slowly, within the turn limit (paper, section 2)."""
     limit = c.target_turn_rate

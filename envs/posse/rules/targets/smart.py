@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.declarations import Memory, target_motion
+from posse.declarations import target_motion
 from posse.numeric import HALF, ONE, TINY, WIDTH, ZERO, Record, Records, compiled
 from posse.numeric.lanes import choose, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
@@ -48,10 +48,8 @@ _SIDES: Final = (ONE, -ONE)
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
 _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
-_PRESSED: Final = Memory("pressed", "s", "of a smart target: time that the team has kept station; < 0: dart")
 
-
-@target_motion("smart", memory=(_PRESSED,), mirrored=False)
+@target_motion("smart", memory=("pressed",), mirrored=False)  # s, time that the team has kept station; < 0: dart
 def smart(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Escapes through the widest gap, and darts when the team keeps station (paper, section 2)."""
     if w.step % SMART_REPLAN != 0:
