@@ -255,7 +255,7 @@ def rollout(
         annotations = policy.annotations(memory) if "annotations" in record else None
         observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
         ended = terminated | truncated
-        begins = batch.worlds["step"] == 0
+        begins = batch.arrays.world["step"] == 0
         if begins.any():
             memory = policy.restart(memory, begins)
         if after_step is not None:

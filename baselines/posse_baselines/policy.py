@@ -19,7 +19,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, ObservationLayout
+from posse import Batch, ObservationLayout, TargetPolicy
 from posse.adapters.actions import as_motions
 from posse.numeric import BoolArray, FloatArray
 
@@ -34,8 +34,8 @@ class PolicyError(ValueError):
 
 
 @runtime_checkable
-class Policy(Protocol):
-    """Drives a team of trackers.
+class Policy(TargetPolicy, Protocol):
+    """Drives a team of trackers, as :class:`posse.TargetPolicy` drives a target: E worlds, N rows.
 
     Attributes:
         name: Its name in results.
@@ -48,18 +48,6 @@ class Policy(Protocol):
     name: str
     message_size: int
     reads_state: bool
-
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the first step of ``num_worlds`` worlds; PolicyError if the layout does not fit."""
-        ...
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N, 2 + m) in [-1, 1] for observations (E, N, F), and the memory."""
-        ...
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the worlds of a mask (E,) reset to those of :meth:`begin`."""
-        ...
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal quantities of the trackers; empty if there are none."""

@@ -113,11 +113,8 @@ def load_target(target: str | Path | Target) -> Target:
         return found
     if getattr(found, "side", "target") != "target":
         raise PolicyError(f"{text!r} is the policy of a team, {found.name!r}, not of a target")
-    missing = [name for name in ("begin", "act", "restart") if not callable(getattr(found, name, None))]
-    if missing:
-        raise PolicyError(
-            f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, as posse.TargetPolicy says"
-        )
+    if not isinstance(found, TargetPolicy):
+        raise PolicyError(f"{text!r:.120} is no target's policy: it lacks begin, act or restart (posse.TargetPolicy)")
     return Target(getattr(found, "name", text), AGENT, found)
 
 

@@ -20,15 +20,10 @@ class _WithTeammates:
     _rows: int | slice = 0
 
     def __init__(
-        self,
-        *arguments: Any,
-        number: int = 0,
-        teammates: str | Policy = "ddcs-distributed",
-        silent: bool = True,
-        **settings: Any,
+        self, *arguments: Any, number: int = 0, teammates: str | Policy = "ddcs-distributed", **settings: Any
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
-        self.number, self._silent = number, silent
+        self.number = number
         super().__init__(*arguments, **settings)
 
     def _fit(self, scenario: str | Scenario, **overrides: Any) -> Scenario:
@@ -45,14 +40,14 @@ class _WithTeammates:
     def _make(self, scenario: Scenario, num_worlds: int, target_policy: Any, **settings: Any) -> Batch:
         if target_policy is not None:
             raise TypeError("target_policy= is not possible in posse/Tracker-v0: a policy moves the team-mates already")
-        return PairedBatch(scenario, num_worlds, self.teammates, outside=self.number, silent=self._silent, **settings)
+        return PairedBatch(scenario, num_worlds, self.teammates, outside=self.number, **settings)
 
 
 class TrackerEnv(_WithTeammates, TeamEnv):
     """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
     **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages of its team-mates.
-    **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``. **Reward**: of this tracker. **Info**,
+    **Action**: ``Box(-1, 1, (2,))``, or ``Discrete(15)``; it says zeros. **Reward**: of this tracker. **Info**,
     **start** and **end** as in ``posse/Team-v0``, with scalar reward terms. The score is that of the team: one tracker
     contributes at most 1/N. The scenario's ``message_size`` is raised to that of the team-mates' policy.
 
@@ -60,9 +55,7 @@ class TrackerEnv(_WithTeammates, TeamEnv):
         scenario: Name of a scenario, or a scenario, with at least two trackers.
         number: Number of the controlled tracker, 0 to N - 1.
         teammates: Policy of the others, or an argument of :func:`posse_baselines.load`.
-        silent: Whether the action has no message part, and the message is zeros.
-        settings: As for :class:`posse.adapters.gymnasium_env.TeamEnv`, without ``target_policy``;
-            ``discrete_actions`` requires ``silent``.
+        settings: As for :class:`posse.adapters.gymnasium_env.TeamEnv`, without ``target_policy``.
 
     Raises:
         ScenarioError: An unknown or invalid setting, a team of one, a target that is an agent, ``number`` not in the

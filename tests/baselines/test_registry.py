@@ -95,7 +95,7 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
         ("smrat", "did you mean 'smart'"),
         ("agent", "unknown target 'agent'"),
         (__file__, "not a policy file"),
-        ("posse_baselines:load", "lacks begin, act, restart"),
+        ("posse_baselines:load", "lacks begin, act or restart"),
         ("a\0b", "unknown target"),
     ],
 )

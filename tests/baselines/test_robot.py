@@ -28,7 +28,7 @@ def motion_of(record: Any) -> tuple[float, float, float, float, float]:
 
 def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
     """What tracker i of the only world received in this step, from the state."""
-    s, arrays, step = batch.scenario, batch.arrays, batch.worlds["step"][0]
+    s, arrays, step = batch.scenario, batch.arrays, batch.arrays.world["step"][0]
     delay = s.radio_delay
     for j in range(s.num_trackers):
         if j == i:
@@ -74,7 +74,7 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
             told = forward, command.turn_rate / s.tracker_turn_rates[i], *command.message
             np.testing.assert_allclose(told[2:], actions[0, i, 2:], atol=1e-4)
             alike.append(np.allclose(told, actions[0, i], atol=1e-4))
-            said, age = robot.robot.broadcast(), (batch.worlds["step"][0] - t.fix_step) * s.control_step
+            said, age = robot.robot.broadcast(), (batch.arrays.world["step"][0] - t.fix_step) * s.control_step
             assert (said.number, said.message) == (i, command.message)
             assert said[1:6] == pytest.approx(motion_of(t))
             assert (said.fix is None) == (t.fix_step < 0)

@@ -150,7 +150,7 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     actions["target_0"] = np.ones(2, np.float32)
     for _ in range(5):
         duel.step(actions)
-    assert duel.unwrapped.batch.worlds["speed"][0] > 0.1, "the target is not guarded"
+    assert duel.unwrapped.batch.arrays.world["speed"][0] > 0.1, "the target is not guarded"
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
 
 

@@ -13,8 +13,8 @@ from posse_baselines.tracker_env import TrackerEnv
 
 
 def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
-    policy = load("ddcs-distributed")
-    env = TrackerEnv("smart", number=2, silent=False, seed=5, horizon=40)
+    policy = load("pursuit")
+    env = TrackerEnv("smart", number=2, teammates=policy, seed=5, horizon=40)
     own, _ = env.reset()
     batch = posse.batch("smart", 1, seed=5, message_size=policy.message_size, horizon=40)
     memory, observations = begin(policy, batch), batch.reset()

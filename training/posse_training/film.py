@@ -47,7 +47,7 @@ class Team:
     @property
     def over(self) -> bool:
         """Whether the episode has ended."""
-        return bool(self.batch.worlds["over"][0])
+        return bool(self.batch.arrays.world["over"][0])
 
     @property
     def colours(self) -> list[style.Colour] | None:

@@ -192,7 +192,7 @@ class PosseEnv(EnvBase):
         for group, part in self._rows.items():
             size = (*self.batch_size, len(self.group_map[group]))
             packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
-        worlds = self.batch.worlds
+        worlds = self.batch.arrays.world
         ended, terminated = worlds["over"] != 0, worlds["terminated"] != 0
         ends = {"terminated": terminated, "truncated": ended & ~terminated}  # TorchRL adds "done"
         for name, values in {"score": worlds["score"].copy(), **ends}.items():

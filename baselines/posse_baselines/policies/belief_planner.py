@@ -316,7 +316,7 @@ class BeliefPlanner(DDCS):
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return those of the DDCS, with the ``estimate`` as believed where the planned motion is played."""
-        notes, world, planned = super().annotations(memory), memory.now.worlds, memory.planned()
+        notes, world, planned = super().annotations(memory), memory.now.arrays.world, memory.planned()
         theta = np.arctan2(world["heading_sin"], world["heading_cos"])
         estimate = np.stack([world["x"], world["y"], theta], axis=-1).reshape(*planned.shape, 3)
         notes["estimate"] = np.where(planned[..., None], estimate, notes["estimate"])

@@ -75,7 +75,7 @@ class Search(OwnArrays):
 
     def actions(self) -> FloatArray:
         """Plan in the worlds where it is due; return the actions (E, rows, 2 + m) for the present state."""
-        step, worlds = self.batch.worlds["step"], self._when_obeyed()
+        step, worlds = self.batch.arrays.world["step"], self._when_obeyed()
         due = np.asarray(step % self._keep == 0)
         if due.any():
             self._plan(worlds, due, np.asarray(step // self._keep, np.int64))

@@ -29,7 +29,7 @@ from posse.engine.kernels import (
     fixed_for,
     kernel_of,
 )
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
 from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, WorldArrays
@@ -154,11 +154,6 @@ class Batch(OwnArrays):
         return names
 
     @property
-    def worlds(self) -> Records:
-        """The worlds' records, (E,) :func:`posse.rules.state.world_record`."""
-        return self.arrays.world
-
-    @property
     def working(self) -> BoolArray:
         """(E, N) whether each tracker works."""
         return np.asarray(self.arrays.tracker["broken_at"] == NEVER)
@@ -219,7 +214,7 @@ class Batch(OwnArrays):
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
                 theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
-        draw_anew(self._fixed.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        draw_anew(self._fixed.config, into.arrays.world, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
 
@@ -257,7 +252,7 @@ class Batch(OwnArrays):
         if not self._started and not chosen.all():
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         poses = poses_of(given, self.scenario, self.num_worlds)
-        before, over, world = self.arrays.copy(), self._over, self.arrays.world
+        before, world = self.arrays.copy(), self.arrays.world
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"][chosen] = SPLITS.index(self.split)
@@ -273,7 +268,8 @@ class Batch(OwnArrays):
                 observations = self._execute(chosen, START_FROM_POSES)
         except BaseException:
             self.arrays.write(before)
-            self._over = over
+            if self._started:
+                self.observe()  # and note again what follows from the state
             raise
         self.seed, self._started = new_seed, True
         return observations

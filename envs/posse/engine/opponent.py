@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from posse.engine.arguments import as_float32, in_box
 from posse.engine.batch import Batch, of_batch
-from posse.engine.kernels import LOOK, Orders, Results
+from posse.engine.kernels import Orders, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, ScenarioError, get_scenario
 from posse.scenarios.family import scenario_or_family, shares
@@ -18,6 +17,7 @@ from posse.scenarios.setting import check_choice, check_count
 from posse.signals.layout import ObservationLayout
 
 
+@runtime_checkable
 class TargetPolicy(Protocol):
     """Moves the target of every world; it observes the trackers without error.
 
@@ -54,26 +54,18 @@ class PairedBatch(Batch):
             each robot that it moves. The team-mates of a tracker are moved by a policy of the whole team, whose action
             for that tracker is not executed. One with ``watch`` is given this batch, whose state it may read.
         outside: ``"trackers"``, ``"target"``, or the number of a tracker.
-        silent: Whether actions from outside are without the message.
         settings: Further arguments of :class:`Batch`.
 
     Attributes:
+        memory: Memory of the policy inside, which is restarted when it acts in a world that is at its start.
         everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), the target's row
             last.
         observation_shape: (E, rows, F).
-        action_shape: (E, rows, 2 + message_size); (E, rows, 2) for the target, which sends no messages, and a silent
-            tracker.
+        action_shape: (E, N, 2 + message_size); (E, 1, 2) for the target or one tracker, which send no messages.
     """
 
     def __init__(
-        self,
-        scenario: str | Scenario,
-        num_worlds: int,
-        inside: TargetPolicy,
-        *,
-        outside: str | int,
-        silent: bool = False,
-        **settings: Any,
+        self, scenario: str | Scenario, num_worlds: int, inside: TargetPolicy, *, outside: str | int, **settings: Any
     ) -> None:
         scenario, one = get_scenario(scenario), not isinstance(outside, str)
         if one and check_count("outside", outside, 0) >= scenario.num_trackers:
@@ -89,21 +81,12 @@ class PairedBatch(Batch):
         if one:
             self._mine = slice(int(outside), int(outside) + 1)
         mine, theirs = (len(range(rows)[part]) for part in (self._mine, self._theirs))
-        self.action_shape = worlds, mine, 2 if silent or outside == "target" else length
+        self.action_shape = worlds, mine, length if outside == "trackers" else 2
         self._their_shape = worlds, theirs, 2 if outside == "trackers" else length
         self.observation_shape = (*self.action_shape[:2], self.layout.size)
         if hasattr(inside, "watch"):
             inside.watch(self)
-        self._begun = np.zeros(worlds, np.bool_)  # episodes for which the memory is still to be restarted
-        self._memory: Any = inside.begin(self.layout, worlds)
-
-    @property
-    def memory(self) -> Any:
-        """Memory of the policy inside, restarted where an episode began since it acted."""
-        if self._begun.any():  # not earlier: the reset that began them could still have been refused
-            self._memory = self.inside.restart(self._memory, self._begun)
-            self._begun = np.zeros_like(self._begun)
-        return self._memory
+        self.memory: Any = inside.begin(self.layout, worlds)
 
     @property
     def working(self) -> BoolArray:
@@ -111,25 +94,15 @@ class PairedBatch(Batch):
         working = super().working
         return working if isinstance(self.outside, str) else working[:, self._mine]
 
-    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
-        """Start an episode in every world; see :meth:`Batch.reset`."""
-        before = self._begun, self.everyone
-        try:
-            return super().reset(seed=seed, options=options)
-        except BaseException:
-            self._begun, self.everyone = before
-            raise
-
     def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
         """Advance every world by valid actions of this side and those of the policy inside.
 
         If the policy's actions are invalid, neither the worlds nor its memory change.
         """
         if orders is None:
-            whole, self._memory = self._with_theirs(actions)
-            self._begun = self.worlds["over"] != 0
+            whole, self.memory = self._with_theirs(actions)
         else:
-            whole, self._begun = np.zeros_like(self.everyone[0]), self._begun | (orders != LOOK)
+            whole = np.zeros_like(self.everyone[0])
         observations, rewards, terms = (np.empty_like(array) for array in self.everyone[1][:3])
         every = results._replace(observations=observations, rewards=rewards, terms=terms)
         over = super()._advance(whole, every, orders)
@@ -142,7 +115,8 @@ class PairedBatch(Batch):
         """Return the actions of all robots, and the memory of the policy inside."""
         who = "target's" if self.outside == "trackers" else "team's"
         seen = self.everyone[1].observations[:, self._theirs].copy()
-        chosen, memory = self.inside.act(seen, self.memory)
+        begun = self.arrays.world["step"] == 0
+        chosen, memory = self.inside.act(seen, self.inside.restart(self.memory, begun) if begun.any() else self.memory)
         array, wanted = as_float32(f"what the {who} policy returned", chosen), self._their_shape
         if array.ndim != 3 or array.shape[:2] != wanted[:2] or array.shape[2] < wanted[2]:
             raise ValueError(f"the {who} policy returned actions of shape {array.shape}, wanted {wanted}")
@@ -180,12 +154,8 @@ def batch(
     inside, side = (team_policy, "team") if target_policy is None else (target_policy, "target")
     if inside is None:
         return Batch(found, num_worlds, **own)
-    missing = [name for name in ("begin", "act", "restart") if not hasattr(inside, name)]
-    if missing:
-        raise TypeError(
-            f"{side}_policy={reprlib.repr(inside)} is not the policy of a {side}: it has no "
-            f"{', '.join(missing)} (posse.TargetPolicy)"
-        )
+    if not isinstance(inside, TargetPolicy):
+        raise TypeError(f"{side}_policy={reprlib.repr(inside)} lacks begin, act or restart (posse.TargetPolicy)")
     outside = "trackers" if side == "target" else "target"
     return PairedBatch(found, num_worlds, inside, outside=outside, **own)
 

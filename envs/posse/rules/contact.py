@@ -52,9 +52,7 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 
 @compiled
-def free_of_robots(
-    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, s: Record
-) -> np.float32:
+def free_of_robots(c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, s: Record) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 
     The positions of all robots, itself among them, are in ``s`` (:func:`posse.rules.discs.lay_out_robots`).

@@ -114,7 +114,7 @@ def least_gap(s: Scenario, w: Records) -> Column:
 @metric("1")
 def control_effort(c: Record, w: Record, t: Record) -> np.float32:
     """Mean of (V / V_max)² + (ω / ω_max)² over the working trackers."""
-    return effort(c, w, t)
+    return np.float32(effort(c, w, t))
 
 
 @metric("1")

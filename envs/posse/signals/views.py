@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, Records, compiled
+from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled
 from posse.numeric.lanes import bits, choose, counts, eight, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned

@@ -60,7 +60,7 @@ class Calls(RuleBasedStateMachine):
             try:
                 subject.env.step(subject.good_action(np.random.default_rng(draw)))
             except ResetNeeded:
-                assert subject.batch.worlds["over"].any()
+                assert subject.batch.arrays.world["over"].any()
         assert same(self.one.held(), self.twin.held())
 
 

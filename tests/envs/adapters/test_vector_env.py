@@ -34,10 +34,7 @@ def vector(name: str = "posse/Team-v0", **settings: Any) -> TeamVectorEnv:
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.value)
 @pytest.mark.parametrize(
     ("name", "settings"),
-    [
-        *((name, {**BUSY[name], "discrete_actions": discrete}) for name in BUSY for discrete in (False, True)),
-        ("Tracker", {**BUSY["Tracker"], "silent": False}),
-    ],
+    [*((name, {**BUSY[name], "discrete_actions": discrete}) for name in BUSY for discrete in (False, True))],
 )
 def test_the_vector_environment_agrees_with_gymnasiums(
     name: str, settings: dict[str, Any], mode: AutoresetMode

@@ -170,8 +170,8 @@ def test_the_episode_after_a_copy_s_end_is_no_world_s() -> None:
     for step in range(2):
         batch.step(actions_for(batch, step))
         copies.step(repeated(batch, step))
-    assert (copies.worlds["step"] == 0).all()
-    assert len({*batch.worlds["x"].tolist(), *copies.worlds["x"].tolist()}) == 6
+    assert (copies.arrays.world["step"] == 0).all()
+    assert len({*batch.arrays.world["x"].tolist(), *copies.arrays.world["x"].tolist()}) == 6
 
 
 def test_faults_that_have_begun_stay_and_others_are_drawn_anew() -> None:

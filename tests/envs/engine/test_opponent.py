@@ -51,7 +51,7 @@ def test_it_plays_as_a_batch_whose_other_side_is_driven_from_outside(side: str, 
     assert mine.shape == inside.observation_shape == theirs[:, own].shape
     for step in range(2 * HORIZON + 3):
         np.testing.assert_array_equal(mine, theirs[:, own])
-        over = outside.worlds["over"] != 0
+        over = outside.arrays.world["over"] != 0
         if autoreset == "disabled" and over.any():
             options = {"reset_mask": over}
             mine, theirs = inside.reset(options=options), outside.reset(options=options)
@@ -137,7 +137,7 @@ def test_clipping_is_for_both_sides() -> None:
 def test_an_object_that_is_no_target_policy_is_refused() -> None:
     with pytest.raises(ValueError, match="exclude each other"):
         posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
-    with pytest.raises(TypeError, match="begin, act, restart"):
+    with pytest.raises(TypeError, match="begin, act or restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
     for outside, words in (("tracker", "known: trackers, target"), (2, "not in the team"), (1.0, "whole number")):
         with pytest.raises(posse.ScenarioError, match=words):

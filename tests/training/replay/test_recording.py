@@ -69,7 +69,7 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
         close(column, "target_x", frame, of["world_x"])
         close(column, "target_y", frame, of["world_y"])
         close(column, "target_dart", frame, of["world_pressed"] < 0)
-        close(column, "score", frame, batch.worlds["score"][0])
+        close(column, "score", frame, batch.arrays.world["score"][0])
         assert ("heard_step" in column) == (of["heard_step"].size > 0)
         if of["heard_step"].size:
             close(column, "heard_step", frame, of["heard_step"])

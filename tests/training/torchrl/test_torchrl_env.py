@@ -105,7 +105,7 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     after = env.reset(carried.set("_reset", marks[:, None]))["agents", "observation"]
     assert torch.equal(after[~marks], before[~marks])
     assert (after[marks] != before[marks]).flatten(1).any(1).all()
-    assert env.batch.worlds["episode"].tolist() == [0, 1, 0, 1, 1, 0]
+    assert env.batch.arrays.world["episode"].tolist() == [0, 1, 0, 1, 1, 0]
 
 
 def test_a_choice_of_autoreset_or_of_a_team_is_refused() -> None:

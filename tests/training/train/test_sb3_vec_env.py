@@ -135,7 +135,7 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     finals = np.stack([info["terminal_observation"] for info in infos])
     assert finals[:, time_left] == pytest.approx(0)
     # Each tracker comes first in its own copy, the others follow by number.
-    w, t = env.batches[1].worlds, env.batches[1].arrays.tracker
+    w, t = env.batches[1].arrays.world, env.batches[1].arrays.tracker
     for i in (0, 3):
         dx, dy = t["x"][0, i] - w["x"][0], t["y"][0, i] - w["y"][0]
         ahead = dx * w["frame_cos"][0] + dy * w["frame_sin"][0]
@@ -168,10 +168,10 @@ def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> No
     env.set_options({"target_pose": (1.0, 2.0, 0.0), "tracker_pose": [(3.0 * i, 7.0, 0.0) for i in range(5)]})
     for at in (True, False):
         env.reset()
-        assert [batch.worlds["x"][0] == 1.0 for batch in env.batches] == [at, at]
+        assert [batch.arrays.world["x"][0] == 1.0 for batch in env.batches] == [at, at]
     wrong = np.zeros((10, 2))
     wrong[9, 0] = np.nan
     for actions, words in ((wrong, "nan"), (np.zeros((5, 4)), r"shape \(5, 4\), wanted \(10, 2\)")):
         with pytest.raises(ValueError, match=words):
             env.step(actions)
-    assert [batch.worlds["step"][0] for batch in env.batches] == [0, 0]
+    assert [batch.arrays.world["step"][0] for batch in env.batches] == [0, 0]

@@ -224,7 +224,7 @@ class SlotGroup:
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
         over = terminated | truncated
-        ended = over | (batch.worlds["step"] == self._cut_at)
+        ended = over | (batch.arrays.world["step"] == self._cut_at)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_slots)]
         if ended.any():
             self._report(raw, ended, terminated, over, infos)
@@ -252,7 +252,7 @@ class SlotGroup:
         worlds = np.flatnonzero(ended)
         final = self.encode(raw, worlds)
         metrics = self.batch.metrics()
-        steps = self.batch.worlds["step"]
+        steps = self.batch.arrays.world["step"]
         # A target's score is what it denies the team.
         denies = isinstance(self.batch, PairedBatch) and self.batch.outside == "target"
         for k, e in enumerate(worlds):
