@@ -434,7 +434,9 @@ SCRATCH: Final = record_type(
 
 def new_scratch(scenario: Scenario, threads: int) -> Records:
     """Return (threads,) :data:`SCRATCH`, with what is the same in all worlds of a scenario."""
-    scratch = np.zeros(threads, SCRATCH)
+    memory = np.zeros(threads * SCRATCH.itemsize + 64, np.uint8)
+    start = -memory.ctypes.data % 64  # of a cache line, so that blocks of eight lie within one
+    scratch = memory[start : start + threads * SCRATCH.itemsize].view(SCRATCH)
     scratch["index"], scratch["radius"] = np.arange(ROBOTS), scenario.robot_radius
     for name, values in zip(("beam_cos", "beam_sin"), beam_directions(scenario), strict=True):
         scratch[name][:, : scenario.sonar_beams] = values
