@@ -4,7 +4,6 @@ import math
 import re
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -95,13 +94,6 @@ def test_a_bad_action_names_its_agent(discrete: bool, action: Any, message: str)
             env.step(actions)
         assert np.array_equal(env.state(), before)
     env.step(good)
-
-
-def test_a_bad_discrete_action_of_a_vector_is_named() -> None:
-    vector = gymnasium.make_vec("posse/Team-v0", 3, discrete_actions=True)
-    vector.reset(seed=0)
-    with pytest.raises(ValueError, match=r"actions\[1, 2\] is 15, outside 0 to 14"):
-        vector.step(np.where(np.arange(15).reshape(3, 5) == 7, 15, 0))
 
 
 @pytest.mark.parametrize("kind", MAKERS)

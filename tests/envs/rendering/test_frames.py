@@ -52,19 +52,6 @@ def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str
     np.testing.assert_array_equal(first, kept, "frames are not overwritten")
 
 
-def test_equal_states_give_equal_frames_also_where_some_are_left_out() -> None:
-    batch = worlds("smart")
-    start = batch.save()
-    drawn, followed = Renderer(batch.scenario, size=SIZE), Renderer(batch.scenario, size=SIZE)
-    for _ in range(25):
-        frame_of(drawn, batch)
-        followed.follow(batch)
-        advance(batch)
-    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(followed, batch))
-    batch.restore(start)  # back in time: a clean picture
-    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(Renderer(batch.scenario, size=SIZE), batch))
-
-
 def test_robots_and_slots_are_drawn_where_they_are() -> None:
     batch = posse.batch("constant", 1, num_trackers=2)
     poses = [(5, 0, 1.57), (-1.2, 0, 0)]  # the second in the wedge's first slot, 1.2 m behind the target
@@ -98,9 +85,3 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
         "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
     )
     assert printed("-c", code).split() == ["False", "(640,", "640,", "3)", "False"]
-
-
-def test_a_size_that_is_too_small_is_named() -> None:
-    batch = posse.batch("smart")
-    with pytest.raises(ValueError, match=r"size=\(100, 400\).*at least 200 px"):
-        Renderer(batch.scenario, size=(100, 400))

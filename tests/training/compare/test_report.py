@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from tests.support.browser import Tags
-from tests.support.learned import any_policy
 
 import posse
 from posse_training.compare import figures
 from posse_training.compare.compare import Comparison, Settings, compare
-from posse_training.compare.contenders import Contender, Plays
+from posse_training.compare.contenders import Plays
 from posse_training.compare.report import extremes
 from posse_training.evaluation.results import Results
 from posse_training.replay import read_replay
@@ -104,23 +103,3 @@ def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
         assert at[score] == expected
     _, bound = line(figure, BOUND)
     assert set(bound) == {1.0}
-
-
-def learned(curve: object) -> Contender:
-    card = {
-        "name": "mine",
-        "curve": curve,
-        "seed": 3,
-        "settings": {"evaluate_worlds": 64},
-        "scenarios": [posse.get_scenario("smart").to_dict()],
-    }
-    return Contender("mine", (any_policy().with_card(card),))
-
-
-def test_learning_curves_are_those_of_the_cards() -> None:
-    points = [{"steps": 1e6 * k, "safe_score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k} for k in (1, 2, 3)]
-    figure = figures.learning(figures.curves_of([learned(points), Contender("idle", ("idle",))]), LOOKS)
-    x, y = line(figure, "mine")
-    assert x == [1, 2, 3]
-    assert y == pytest.approx([0.2, 0.4, 0.6])
-    assert figures.curves_of([learned("none")]) == figures.curves_of([learned(points[:1])]) == []

@@ -84,18 +84,6 @@ def test_it_plays_to_the_end_and_pauses(browser: Browser, written: Path) -> None
         until(page, "window.replay.app.position < 100 && window.replay.app.playing")
 
 
-def test_it_opens_playing_a_second_before_the_first_event_after_the_start(browser: Browser, written: Path) -> None:
-    first = min(event.step for player in read_replay(written).players for event in player.events if event.step)
-    with opened(browser, written) as page:
-        assert state(page, "playing")
-        until(page, f"window.replay.app.position > {first}")
-    with opened(browser, written, still=True) as page:
-        assert not state(page, "playing")
-        assert state(page, "position") == max(0, first - 10)
-    with opened(browser, written, "#t=3") as page:
-        assert not state(page, "playing")
-
-
 @pytest.mark.parametrize("size", [(1300, 800), (390, 844)])
 def test_the_head_says_what_happened_what_one_sees_and_how_to_make_it_again(
     browser: Browser, written: Path, size: tuple[int, int]
@@ -108,18 +96,6 @@ def test_the_head_says_what_happened_what_one_sees_and_how_to_make_it_again(
             box = page.locator(part).bounding_box()
             assert box is not None
             assert 0 <= box["x"] < box["x"] + box["width"] <= size[0]
-
-
-def test_in_a_frame_of_another_page_it_plays_with_the_verdict_alone(browser: Browser, tmp_path: Path) -> None:
-    # A request for what begins like the page is its own.
-    inner = write_replay(short(), tmp_path / "host.html.inner.html")
-    (tmp_path / "host.html").write_text(f'<html data-ready="yes"><iframe src="{inner.name}" width="600" height="500">')
-    with opened(browser, tmp_path / "host.html") as page:
-        frame = page.frames[1]
-        frame.wait_for_selector("html[data-ready]")
-        assert frame.evaluate("window.replay.app.playing")
-        assert frame.locator("#verdict").is_visible()
-        assert not any(frame.locator(part).is_visible() for part in ("#seen", "#made", "#panel"))
 
 
 def test_where_poses_drift_each_tracker_has_a_ghost_in_the_pose_that_it_believes(
@@ -232,9 +208,3 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
         page.evaluate("location.hash = '#t=nonsense&r=99'")
         until(page, "window.replay.app.selected === null")
         assert state(page, "position") == 4
-
-
-def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:
-    replay = record(["idle"], "duel", num_trackers=3, target="eight", seconds=2, observations=False)
-    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=1&r=3") as page:
-        assert page.locator("#panel h2").inner_text().startswith("target")

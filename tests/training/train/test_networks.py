@@ -21,18 +21,6 @@ from posse_training.train.train import train
 from posse_training.train.worlds import make_env
 
 
-def test_adding_in_parts_is_adding_at_once() -> None:
-    rows = np.random.default_rng(0).normal(3, 2, (500, 4)).astype(np.float32)
-    rows[:, 3] = 7.0
-    statistics = RunningStatistics(4)
-    for part in np.split(rows, [1, 50, 300]):
-        statistics.add(part)
-    np.testing.assert_allclose(statistics.mean, rows.mean(axis=0), rtol=1e-5)
-    np.testing.assert_allclose(statistics.var, rows.var(axis=0), rtol=1e-5, atol=1e-9)
-    np.testing.assert_allclose(statistics.scale[:3], 1 / rows[:, :3].std(axis=0), rtol=1e-5)
-    assert statistics.scale[3] == 0, "an input that never varies says nothing"
-
-
 def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
