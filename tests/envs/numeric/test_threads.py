@@ -57,10 +57,10 @@ def test_an_error_propagates_when_no_thread_is_at_work(failing: int) -> None:
 @threaded
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals of POSIX")
 def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
-    """Nothing is written afterwards, and all shares are done, but for an interrupt at a share's very beginning."""
+    """Nothing is written afterwards, and all shares are done, or none."""
 
     def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
 
     @kernel
     def slow(times: npt.NDArray[np.int64], thread: int, first: int, end: int) -> int:
@@ -69,7 +69,7 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
                 times[e] += 1
         return 0
 
-    interrupted, whole, rng = 0, 0, np.random.default_rng(0)
+    interrupted, rng = 0, np.random.default_rng(0)
     slow(np.zeros(8, np.int64), 0, 0, 8)
     before = signal.signal(signal.SIGALRM, interrupt)
     gc.disable()  # an exception within a callback of the collector would be lost
@@ -85,14 +85,12 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
             then = times.copy()
             time.sleep(1e-4)
             np.testing.assert_array_equal(times, then)
-            assert set(times) <= {0, 300}
-            whole += len(set(times)) == 1
+            assert set(times) in ({0}, {300})
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
         gc.enable()
     assert interrupted == 100
-    assert whole > 90
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
