@@ -83,8 +83,12 @@ class BasePolicy:
         return {}
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory as arrays (E, ...) by name; views, not copies."""
-        return memory.arrays() if hasattr(memory, "arrays") else {}
+        """Return the memory as arrays (E, ...) by name; views, not copies. PolicyError if it is of an unknown kind."""
+        if isinstance(memory, ObservationLayout):  # that of :meth:`begin` here: nothing is remembered
+            return {}
+        if not hasattr(memory, "arrays"):
+            raise PolicyError(f"the memory of policy {self.name!r} cannot be saved: define its method arrays(memory)")
+        return dict(memory.arrays())
 
     def __repr__(self) -> str:
         return f"<policy {self.name!r}>"

@@ -59,18 +59,23 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
             not; or one of ``posse/Team-v0``, ``posse/Solo-v0`` and ``posse/Tracker-v0``.
 
     Raises:
-        PolicyError: Discrete actions, which are no velocities.
+        PolicyError: Discrete actions, which are no velocities; observations or actions that a wrapper changes.
         TypeError: Something else.
     """
     guarded: Any
     if isinstance(env, ParallelEnv) and hasattr(env.unwrapped, "layout"):
-        guarded, space = _GuardedParallelEnv, env.action_space(env.possible_agents[0])
+        guarded, agent, inner = _GuardedParallelEnv, env.possible_agents[0], env.unwrapped
+        space, seen = env.action_space(agent), env.observation_space(agent)
+        own = inner.action_space(agent), inner.observation_space(agent)
     elif isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
-        guarded, space = _GuardedEnv, env.action_space
+        guarded, space, seen = _GuardedEnv, env.action_space, env.observation_space
+        own = env.unwrapped.action_space, env.unwrapped.observation_space
     else:
         raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
     if not isinstance(space, spaces.Box):
         raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
+    if (space, seen) != own:
+        raise PolicyError("a wrapper changes what the safeguard reads or says: put it round the safeguard instead")
     return guarded(env)
 
 

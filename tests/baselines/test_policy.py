@@ -160,6 +160,11 @@ def test_what_cannot_be_recorded_is_named() -> None:
         rollout(posse.batch("constant", 1), load("idle"), steps=0)
 
 
+def test_a_memory_that_cannot_be_saved_is_refused() -> None:
+    with pytest.raises(PolicyError, match=r"'idle' cannot be saved: define its method arrays\(memory\)"):
+        BasePolicy.arrays(load("idle"), np.zeros(3))  # type: ignore[arg-type]
+
+
 # --- refusals ------------------------------------------------------------------------------------
 
 

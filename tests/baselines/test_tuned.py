@@ -54,12 +54,14 @@ def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None
 @pytest.mark.parametrize(("name", "path"), FILES[:: len(FILES) - 1])  # one of each policy
 def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path) -> None:
     values = json.loads(path.read_text())["settings"]
-    tuned = play(batch_of(path.stem), load(name))["score"]
+    policy: Any = load(name)
+    tuned = play(batch_of(path.stem), policy)["score"]
     by_hand = play(batch_of(path.stem), DDCS(FAMILY[TUNED[name]]).with_settings(**values))["score"]
     untuned = play(batch_of(path.stem), load(TUNED[name]))["score"]
     from_file = play(batch_of(path.stem), load(path))["score"]
     np.testing.assert_array_equal(tuned, by_hand)
     np.testing.assert_array_equal(tuned, from_file)
+    np.testing.assert_array_equal(tuned, play(batch_of(path.stem), policy.with_settings(radio=True))["score"])
     assert np.any(tuned != untuned)
 
 

@@ -44,6 +44,8 @@ MISTAKES: Final = {
     MOTION.format(', memory=["speed"]', "", "pass"): r"a world has a field 'speed'",
     SENSOR.format("c", '"own", fix="range"'): r"sensor own \(main.py:3\): unknown fix='range'; allowed: pos",
     SENSOR.format("c", '"own", measure=m'): r"sensor m \(main.py:1\): its parameters are \(c\), not \(c, w, number, dx",
+    SENSOR.format("c, w, number, dx, dy", '"own", measure=m').replace("dx, dy\n@", "dx / 0.0, dy\n@")
+    + 'posse.batch(sensor="own").reset()': "an observation is not finite: .*sensor='own' measures",
     # What the compiler says.
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): unknown field 'sped' \(did you mean 'speed'",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"own \(main.py:1\): (.|\n)*to float32",

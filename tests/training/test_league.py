@@ -10,7 +10,7 @@ from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, killed_at, quiet
 
 from posse_training import league
-from posse_training.errors import RunFolderError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.league import LeagueSettings, draw_matrix, play_league, shares
 from posse_training.train.train import Run
 
@@ -72,6 +72,9 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
         play_league(replace(settings, seed=2, longer=2), console=quiet())
     more = play_league(replace(settings, episodes=2), console=quiet())
     assert more.cells["idle", "smart"]["score"].count == 2, "what is no training may be changed"
+    with pytest.raises(SettingsError, match="unknown setting 'foo'"):
+        play_league(tiny(tmp_path / "new", training={"foo": 1}), console=quiet())
+    assert not (tmp_path / "new").exists()
     (tmp_path / "league.json").write_text("[")
     with pytest.raises(RunFolderError, match="is damaged"):
         play_league(settings, console=quiet())

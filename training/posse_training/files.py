@@ -58,9 +58,14 @@ def intact(path: Path) -> Iterator[None]:
         raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another --out") from error
 
 
-def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
-    """Raise if a file holds other settings of a run, but for those that are ``free``."""
+def check_held(
+    path: Path, settings: Mapping[str, Any], free: Collection[str] = (), results: Collection[str] = ()
+) -> None:
+    """Raise if a file holds other settings of a run, but for those that are ``free``, or is missing beside results."""
     if not path.is_file():
+        for name in results:
+            if (path.parent / name).exists():
+                raise RunFolderError(f"{path.parent} has {name}, but no {path.name} of a run: choose another --out")
         return
     wanted = json.loads(json.dumps(settings))
     with intact(path):

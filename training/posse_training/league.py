@@ -18,7 +18,6 @@ from rich.console import Console
 from rich.table import Table
 
 from posse import get_scenario
-from posse_baselines import load, load_target
 from posse_baselines.fields import number
 from posse_baselines.files import read_json, replacing, write_json
 from posse_baselines.policies.open_loop import OPEN_LOOP
@@ -204,11 +203,17 @@ class League:
         """Train a member so many times as long as usual, or resume that; it begins where its side's latest ended."""
         from posse_training.train.train import train  # torch
 
-        s, run = self.settings, trained.run
-        assert run is not None
-        steps = longer * (s.target_steps if side == TARGET else s.team_steps)
-        self.console.print(f"{trained.label}: {run}", markup=False)
+        assert trained.run is not None
+        self.console.print(f"{trained.label}: {trained.run}", markup=False)
         start = next((m.run for m in reversed(own) if m.run is not None), None)
+        train(self.training(side, trained.run, opponents, longer, start), console=self.console)
+
+    def training(
+        self, side: str, run: Path, opponents: str, longer: int = 1, start: Path | None = None
+    ) -> TrainSettings:
+        """Return the settings of a side's training in a folder, against opponents separated by commas."""
+        s = self.settings
+        steps = longer * (s.target_steps if side == TARGET else s.team_steps)
         values = {
             **default_settings(s.scenario, side=side).to_dict(),
             "steps": steps,
@@ -223,7 +228,7 @@ class League:
             "tensorboard": False,
             "beside": None,
         }
-        train(TrainSettings.from_dict({**values, **s.training}), console=self.console)
+        return TrainSettings.from_dict({**values, **s.training})
 
     def _difficulty(self, side: str, own: Member, other: Member) -> float:
         """Return how hard an opponent is for a member, in [0, 1].
@@ -252,10 +257,10 @@ class League:
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
     """Train the generations that are missing, play all against all, train best responses."""
     found = League(settings, console or Console())
-    for team in settings.teams:
-        load(team)
-    for target in settings.targets:
-        load_target(target)
+    from posse_training.train.worlds import pairings  # torch
+
+    for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
+        pairings(found.training(side, settings.path, ",".join(others)))
     with locked(settings.path):
         hold_settings(settings.path / "league.json", settings.to_dict(), _FREE)
         found.play()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -47,6 +47,10 @@ class Random(BasePolicy):
         s = super().begin(layout, num_worlds).scenario
         shape = s.num_trackers, 2 + s.message_size, layout.size
         return np.random.default_rng(self.seed).integers(2**64, size=shape, dtype=np.uint64)
+
+    def arrays(self, memory: Memory) -> dict[str, Any]:
+        """Return none: the factors are always those of :meth:`begin`."""
+        return {}
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return random speeds, turn rates and messages."""

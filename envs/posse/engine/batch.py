@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.declarations import Declarations
+from posse.declarations import DeclarationError, Declarations
 from posse.engine.arguments import as_float32, in_box, mask_of, options_of, poses_of
 from posse.engine.kernels import (
     LOOK,
@@ -40,7 +40,7 @@ from posse.signals.reward import check_terms
 
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
-_DERIVED: Final = frozenset(("_declared", "_own_terms", "_kernel", "_orders", "_fixed", "_info"))
+_DERIVED: Final = frozenset(("_declared", "_own_terms", "_own_rules", "_kernel", "_orders", "_fixed", "_info"))
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -123,6 +123,7 @@ class Batch(OwnArrays):
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = Declarations.of(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
+        self._own_rules = not all(rule.built_in for rule in (*self._declared.motions, *self._declared.sensors))
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
@@ -382,6 +383,12 @@ class Batch(OwnArrays):
         self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
+        if self._own_rules and not np.isfinite(results.observations).all():
+            s = self.scenario
+            raise DeclarationError(
+                f"an observation is not finite: see what target_motion={s.target_motion!r} sets, and what "
+                f"sensor={s.sensor!r} measures"
+            )
         return over
 
     def _new_results(self) -> Results:

@@ -86,6 +86,9 @@ def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Pa
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(RunFolderError, match=r"checkpoint\.pt is damaged"):
         resume(tmp_path)
+    (tmp_path / "settings.json").unlink()
+    with pytest.raises(RunFolderError, match=r"has best\.safetensors, but no settings\.json of a run"):
+        train(small(tmp_path), console=quiet())
 
 
 def test_a_folder_in_use(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
         stack.enter_context(locked(folder))
-        check_held(folder / SETTINGS, settings.to_dict(), FREE)
+        check_held(folder / SETTINGS, settings.to_dict(), FREE, (BEST, LAST, checkpoint.CHECKPOINT))
         # A run killed before its first checkpoint starts again, with the same result.
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
@@ -68,6 +68,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
         display.beside = score_beside(settings, display)
+        env.arrays()  # an opponent's memory that cannot be saved raises now, not at the first checkpoint
         run = Run(settings, folder, env, model, display)
         if saved is None:
             run.begin()
