@@ -40,7 +40,6 @@ def _shares_of(num_worlds: int, threads: int) -> list[tuple[int, int]]:
     """Return shares of whole eights of worlds, ever smaller ones, so that the threads end at the same time.
 
     The first is three quarters of a thread's part: a thread that the system interrupts leaves the rest to the others.
-
     """
     # Shares of few worlds are smaller, or the caller would take them all before another thread begins.
     least = max(WIDTH, min(_LEAST_SHARE, num_worlds // (4 * threads) // WIDTH * WIDTH))
