@@ -58,8 +58,8 @@ def _interrupts_wait() -> Iterator[None]:
         yield
         return
     received: list[Any] = []
-    signal.signal(signal.SIGINT, lambda *signal_and_frame: received.append(signal_and_frame))
     try:
+        signal.signal(signal.SIGINT, lambda *signal_and_frame: received.append(signal_and_frame))
         yield
     finally:
         signal.signal(signal.SIGINT, handler)

@@ -16,7 +16,7 @@ from posse.numeric import ONE, ZERO, FloatArray, Record
 
 @reward_term("1")
 def slot(c: Record, w: Record, t: Record) -> np.float32:
-    """1 while the tracker occupies a slot (within tolerance, touching nothing), else 0."""
+    """1 while the tracker occupies a slot: its nearest, within tolerance, touching nothing; of two the lower number."""
     return ONE if t.slot >= 0 else ZERO
 
 
