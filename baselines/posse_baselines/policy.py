@@ -35,7 +35,7 @@ class PolicyError(ValueError):
 
 @runtime_checkable
 class Policy(TargetPolicy, Protocol):
-    """Drives a team of trackers, as :class:`posse.TargetPolicy` drives a target: E worlds, N rows.
+    """Drives a team of trackers, with the methods of :class:`posse.TargetPolicy`, for N robots instead of one.
 
     Attributes:
         name: Its name in results.
