@@ -76,7 +76,9 @@ def check_held(
         raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another --out, or remove it")
 
 
-def hold_settings(path: Path, settings: Mapping[str, Any], free: Collection[str] = ()) -> None:
+def hold_settings(
+    path: Path, settings: Mapping[str, Any], free: Collection[str] = (), results: Collection[str] = ()
+) -> None:
     """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
-    check_held(path, settings, free)
+    check_held(path, settings, free, results)
     write_json(path, settings)

@@ -256,9 +256,9 @@ class League:
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
     """Train the generations that are missing, play all against all, train best responses."""
-    found = League(settings, console or Console())
     from posse_training.train.worlds import pairings  # torch
 
+    found = League(settings, console or Console())
     for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
         pairings(found.training(side, settings.path, ",".join(others)))
     with locked(settings.path):

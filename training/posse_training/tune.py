@@ -30,7 +30,7 @@ from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import Estimate, mean
-from posse_training.files import check_held, hold_settings, intact, locked
+from posse_training.files import hold_settings, intact, locked
 from posse_training.options import Ray
 from posse_training.parallel import all_on_ray, connected
 from posse_training.provenance import commit, software
@@ -161,8 +161,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     held = {name: value for name, value in asdict(settings).items() if name not in _FREE}
     held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
     with connected(settings.ray), locked(folder):
-        check_held(folder / "settings.json", held, (), (RESULT,))
-        hold_settings(folder / "settings.json", held)
+        hold_settings(folder / "settings.json", held, results=(RESULT,))
         write_json(folder / RESULT, run.play())
     return folder / RESULT
 

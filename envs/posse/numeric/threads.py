@@ -43,11 +43,11 @@ def _shares_of(num_worlds: int, threads: int) -> list[tuple[int, int]]:
     """
     # Shares of few worlds are smaller, or the caller would take them all before another thread begins.
     least = max(WIDTH, min(_LEAST_SHARE, num_worlds // (4 * threads) // WIDTH * WIDTH))
-    ends, last = [0], max(0, num_worlds - least) // WIDTH * WIDTH
-    while ends[-1] < last:
-        share = max(least, 3 * (last - ends[-1]) // (4 * threads) // WIDTH * WIDTH)
-        ends.append(min(last, ends[-1] + share))
-    return list(itertools.pairwise([*ends, num_worlds]))
+    ends = [0]
+    while ends[-1] < num_worlds:
+        share = max(least, 3 * (num_worlds - ends[-1]) // (4 * threads) // WIDTH * WIDTH)
+        ends.append(min(num_worlds, ends[-1] + share))
+    return list(itertools.pairwise(ends))
 
 
 @contextlib.contextmanager
