@@ -40,8 +40,9 @@ def advance(batch: posse.Batch, steps: int = 1) -> None:
 @pytest.mark.parametrize("scenario", posse.scenario_names())
 def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str) -> None:
     batch = worlds(scenario)
-    renderer = Renderer(batch.scenario, size=SIZE)
+    renderer, followed = (Renderer(batch.scenario, size=SIZE) for _ in range(2))
     first = frame_of(renderer, batch)
+    followed.follow(batch)
     kept, before = first.copy(), {name: values.copy() for name, values in batch.state.items()}
     assert first.shape == (360, 400, 3)
     np.testing.assert_array_equal(first, frame_of(renderer, batch), "the same moment looks the same")
@@ -50,6 +51,7 @@ def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str
     advance(batch, 3)
     assert (frame_of(renderer, batch) != first).any()
     np.testing.assert_array_equal(first, kept, "frames are not overwritten")
+    np.testing.assert_array_equal(frame_of(renderer, batch), frame_of(followed, batch), "also where one was left out")
 
 
 def test_robots_and_slots_are_drawn_where_they_are() -> None:
