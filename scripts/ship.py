@@ -266,15 +266,22 @@ def command_of(settings: TrainSettings) -> str:
     return shlex.join(words)
 
 
+def _check_again(path: Path, check: dict[str, Any]) -> None:
+    policy = LearnedPolicy.from_file(path)
+    policy.with_card({**policy.card, "check": check, "checked_at": commit()}).save(path)
+    print(path.stem, *(f"{play['scenario']} {play['score']:.3f}" for play in check.get("plays", [check])))
+
+
 def main() -> None:
     """Ship, or check all that ships anew."""
     settings = tyro.cli(Settings, description=__doc__)
     if settings.again:
         for path in sorted(SHIPPED.glob("*.safetensors")):
             policy = LearnedPolicy.from_file(path)
-            check = make_check(policy, check_scenarios(policy.card["check"]))
-            policy.with_card({**policy.card, "check": check, "checked_at": commit()}).save(path)
-            print(path.stem, *(f"{play['scenario']} {play['score']:.3f}" for play in check["plays"]))
+            _check_again(path, make_check(policy, check_scenarios(policy.card["check"])))
+        for path in sorted(SHIPPED_TARGETS.glob("*.safetensors")):
+            then = LearnedPolicy.from_file(path).card["check"]
+            _check_again(path, make_target_check(then["team"], get_scenario(then["scenario"]), load_target(path.stem)))
         return
     path = ship(settings)
     card = LearnedPolicy.from_file(path).card

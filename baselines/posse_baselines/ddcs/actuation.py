@@ -1,4 +1,4 @@
-"""The actuation layer around the safeguard: what is near, ways past it, and commands that are executed late.
+"""The actuation layer around the safeguard: what is near, ways past it, and commands that are carried out late.
 
 **Surroundings.** The nearby discs of a tracker: known ones, and unexplained echoes of the sonar.
 
@@ -6,7 +6,7 @@
 direction helps, and it slows down. A detour turns the wanted velocity to the edge of what is in the
 way, and keeps to the side that it began with.
 
-**Foresight.** Where commands are delayed or lag, decisions are for the moment at which they are executed.
+**Execution.** Where motion lags, more is commanded; delayed commands are remembered for monitoring.
 """
 
 from __future__ import annotations
@@ -15,22 +15,11 @@ import math
 from typing import Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import Team, since
-from posse_baselines.ddcs.monitoring import target_after
+from posse_baselines.ddcs.memory import Team, pair, since
 from posse_baselines.ddcs.settings import FLOCKING
 from posse_baselines.laws.geometry import clip, cross, dot, length, scaled, unit, vector
 from posse_baselines.laws.guidance import regulate, write_motion
-from posse_baselines.laws.safeguard import (
-    MOST_TURN,
-    NEAR,
-    WALLS,
-    put_disc,
-    put_near,
-    put_walls,
-    safe_velocity,
-    to_wall,
-    turn_past,
-)
+from posse_baselines.laws.safeguard import MOST_TURN, WALLS, put_disc, put_walls, safe_velocity, to_wall, turn_past
 
 _EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
 _MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
@@ -46,8 +35,7 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
     world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(len(robots)):
-        # As it was when the sonar measured.
-        place = robots[j].place - scaled(robots[j].velocity, world.lead) + me.moved
+        place = robots[j].place
         square = dot(place, place)
         if square > reach * reach:
             continue
@@ -56,11 +44,9 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
         if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(cross(place, beam)) < radius + 0.1):
             return True
     for k in range(4):
-        away, towards = to_wall(world, k, me.position - me.moved), dot(WALLS[k], beam)
-        if away < NEAR and towards > 0.0:
-            away = away / towards if towards < wide_beam else away
-            if reading >= away - radius - _EXPLAINED:
-                return True
+        away, towards = to_wall(world, k, me.position), dot(WALLS[k], beam)
+        if towards > 0.0 and reading >= away / towards - radius - _EXPLAINED:
+            return True
     return False
 
 
@@ -73,7 +59,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         # In a chase the target is not avoided: the law ends the chase in time.
         reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
         way = me.target - me.position
-        count = put_near(discs, count, way, me.target_velocity, reach, margin)
+        count = put_disc(discs, count, way, me.target_velocity, reach, margin)
         if count > 0 and world.target_turns > 0.0:
             for turn in (-world.target_turns, world.target_turns):
                 count = put_disc(discs, count, way, me.target_velocity, reach, margin)
@@ -83,14 +69,14 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
         if mate.step < 0:
             continue
         age = since(team, me, mate.step)
-        way, velocity = mate.place - me.position, complex(mate.velocity) if age <= me.patience else 0j
+        way, velocity = mate.place - me.position, complex(mate.velocity) if age <= world.patience else 0j
         # If it were still there after a silence, it would have a place in the observation.
-        if not (world.unlisted and age > me.patience and length(way) < me.horizon):
+        if not (world.unlisted and age > world.patience and length(way) < me.horizon):
             margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
-            count = put_near(discs, count, way, velocity, two, margin)
+            count = put_disc(discs, count, way, velocity, two, margin)
     robots = count
     count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
-    heading = me.heading * me.turned.conjugate()
+    heading = pair(row, at.heading)  # at which the sonar measured
     course = complex(me.target_velocity) if me.known and world.strangers else 0j  # a team-mate moves with the target
     for k in range(at.sonar_beams):
         reading = float(row[at.sonar + k])
@@ -99,7 +85,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
             continue
         # Its position within the beam is unknown: a disc that fills most of the beam.
         wide = min(0.5, 0.4 * (reading + radius))
-        place = scaled(beam, reading + radius + wide) - me.moved
+        place = scaled(beam, reading + radius + wide)
         count = put_disc(discs, count, place, course, wide + radius, settings.echo_margin)
     return count
 
@@ -124,36 +110,6 @@ def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
         return wanted
     me.side, me.side_step = 1 if goes_left else -1, me.step
     return wanted * vector(1.0, turn)
-
-
-# --- foresight -----------------------------------------------------------------------------------
-
-
-@compiled
-def foresee(team: Team, me: Record) -> None:
-    """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
-    delay, dt = int(team.world.delay), float(team.world.dt)
-    me.moved, me.turned = 0j, 1.0 + 0j
-    if delay == 0:
-        return
-    start = me.heading
-    for k in range(delay):
-        waiting = me.waiting[(me.step + k) % delay]
-        speed, omega = me.speed, me.omega
-        change, turn_change = me.acceleration * dt, me.turn_acceleration * dt
-        me.speed += clip(team.world.followed * (waiting.real - speed), -change, change)
-        me.omega += clip(team.world.followed * (waiting.imag - omega), -turn_change, turn_change)
-        mean, turn = me.speed, me.omega * dt
-        if team.world.followed < 1.0:
-            mean, turn = 0.5 * (speed + me.speed), 0.5 * (omega + me.omega) * dt
-        me.moved += scaled(me.heading * vector(1.0, 0.5 * turn), mean * dt)
-        me.heading *= vector(1.0, turn)
-    me.turned = me.heading * start.conjugate()
-    me.position += me.moved
-    if me.known:
-        me.target, me.target_theta = target_after(team, me, me.fix_age + team.world.lead)
-        me.target_velocity = vector(me.target_speed, me.target_theta)
-        me.frame *= vector(1.0, me.psi_rate * team.world.lead)
 
 
 @compiled

@@ -12,7 +12,7 @@ everyone, target unknown         drives ahead, away from team-mates and borders 
 leader, far (converging)         PNGL, θ = K σ + c, at full speed: (5), (6), (12)        ``motion.pursue``,
                                                                                          ``laws.guidance``
 leader, near (flocking)          PNGL, the speed of (13) with a correction of the range  ``motion.pursue``
-follower, far (converging)       intercepts its place on the leader at full speed        ``motion.move``,
+follower, far (converging)       intercepts its place on the leader at full speed        ``motion.take_place``,
                                                                                          ``laws.steering``
 follower, near (flocking)        l-φ on the leader, figure 6                             ``motion.follow``,
                                                                                          ``laws.formation``
@@ -34,9 +34,9 @@ import numpy as np
 
 from posse import SENSORS, ObservationLayout, Scenario
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.actuation import correct, execute_safely, foresee, surround
-from posse_baselines.ddcs.memory import Minds, Team, for_each, is_due, unit_of
-from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, place_mates, write_message
+from posse_baselines.ddcs.actuation import correct, execute_safely, surround
+from posse_baselines.ddcs.memory import Minds, Team, for_each, is_due, pair, unit_of
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
@@ -145,8 +145,6 @@ class DDCS(BasePolicy):
 def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, proposal: FloatArray) -> None:
     """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
     monitor(team, me, mates, row)
-    foresee(team, me)
-    place_mates(team, me, mates)
     if team.settings.centralized:
         settle_lead(team, me, mates)
     if me.known == 0:
@@ -175,9 +173,7 @@ def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, a
     """
     monitor(team, me, mates, row)
     wanted = complex(float(action[0]), float(action[1]))
-    wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
-    foresee(team, me)
-    place_mates(team, me, mates)
+    wanted = scaled(wanted * pair(row, team.at.heading), me.max_speed / max(1.0, length(wanted)))
     want(me, wanted)
     execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
 

@@ -40,6 +40,8 @@ _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 _SEEN_BEFORE: Final = 1.6  # times the range of sight, before a border at which robots that explore are pushed back
+_HARDLY: Final = 1e-3  # probability
+_RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
 
 
 def unit_of(scenario: Scenario) -> float:
@@ -84,6 +86,7 @@ def constants_of(scenario: Scenario) -> Records:
         # cosine of a little more than half a beam's width
         wide_beam=_F(math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))),
         radius=_F(scenario.robot_radius / unit),  # of a robot's disc, m
+        patience=patience_of(scenario),  # silence up to which a team-mate counts as working and in range, s
         walled=_I(scenario.walled),
         half_width=_F(half_width),  # of the arena, m
         half_height=_F(half_height),
@@ -99,6 +102,14 @@ def constants_of(scenario: Scenario) -> Records:
         target_turns=scenario.target_turn_rate if scenario.target_is_agent else 0.0,
         outermost=max(abs(complex(*slot) / unit) for slot in scenario.slot_offsets),  # slot's distance, m
     )
+
+
+def patience_of(scenario: Scenario) -> float:
+    """Return the silence (s) after which a robot is taken for broken: losses hardly explain it."""
+    if scenario.radio_outages > 0.0:
+        return _RADIO_FAILS
+    lost = math.log(_HARDLY) / math.log(scenario.radio_loss) if scenario.radio_loss > 0.0 else 0.0
+    return (scenario.radio_delay + lost + 1.5) * scenario.control_step
 
 
 def _inner(half: float, sight: float) -> float:
@@ -159,7 +170,6 @@ MIND: Final = record(
     fix_psi=_F(0),
     target_speed=_F(0),  # estimated speed, m/s
     target_turn=_F(0),  # estimated turn rate, rad/s
-    speed_known=_I(0),  # 1: the speed has been measured
     # the target, as it is taken to be now
     target=_C(0),  # position
     target_theta=_F(0),
@@ -170,10 +180,7 @@ MIND: Final = record(
     fix_age=_F(0),  # s
     known=_I(0),  # 1: there is an estimate that is not too old
     horizon=_F(0),  # distance within which every team-mate that is heard is listed, m
-    usual_gap=_F(0),  # about the longest silence of a team-mate lately, s
-    patience=np.float64(0),  # silence up to which a team-mate counts as working and in range, s
     others=_I(0),  # how many do
-    usual_age=_F(0),  # about the usual age of the fix, s
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none
@@ -186,8 +193,6 @@ MIND: Final = record(
     wish_omega=np.float64(0),
     # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
     waiting=np.zeros(_MOST_WAITING, np.complex128),
-    moved=np.complex128(0),  # from the observation to the execution of the command, m
-    turned=np.complex128(1),  # by then, as a rotation
     # leadership
     leader=_I(-1),  # -1: none yet
     term=_I(0),  # how often the lead has passed, modulo 256; the higher claim wins

@@ -25,12 +25,9 @@ _PART: Final = 0.45  # of a step; where poses drift, a number carries a measure 
 _FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
-_LATE: Final = 1.0  # s; a fix of up to this age is delayed, an older one is lost
 _TARGET_LOST: Final = 10.0  # s; a fix older than this is no longer followed
+_FRAME_TRUST: Final = 0.5  # share of a new measurement in the offset between a team-mate's frame and the own one
 _SPEED_MEMORY: Final = 3.0  # s; time constant of the target's estimated speed
-_LOST_AFTER: Final = 1.5  # s; a team-mate that has been silent for longer counts as lost
-_LEAST_PATIENCE: Final = 0.3  # s; a silence shorter than this plus twice the usual one is ignored
-_GAP_MEMORY: Final = 10.0  # s; time constant of the memory of silences
 
 
 @compiled
@@ -96,7 +93,7 @@ def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None
         way = complex(_FARTHEST * part_of(row[m + 1]), _FARTHEST * part_of(row[m + 2]))
         place = target - way * vector(1.0, heading)
         before = mate.position - vector(length(mate.velocity) * dt, angle_of(mate.heading) - 0.5 * mate.turn * dt)
-        share = float(team.settings.frame_trust) if mate.aligned else 1.0
+        share = _FRAME_TRUST if mate.aligned else 1.0
         mate.twist = wrap(mate.twist + share * wrap(heading - told - mate.twist))
         mate.shift += scaled(place - before - mate.shift, share)
         mate.aligned = 1
@@ -107,10 +104,12 @@ def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None
 
 @compiled
 def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
-    """Read what one tracker observes (F,): itself, the target, its team-mates."""
+    """Read what one tracker observes (F,): itself, the target, its team-mates; foresee them for the next command."""
     read_body(team, me, row)
     watch_target(team, me, row)
     update_mates(team, me, mates, row)
+    foresee(team, me)
+    place_mates(team, me, mates)
 
 
 @compiled
@@ -157,9 +156,6 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     if me.fix_step < 0:
         return
     me.fix_age = since(team, me, me.fix_step)
-    if me.fix_age <= _LATE:
-        # The usual age of fixes, to detect unusual delays.
-        me.usual_age += (dt / _GAP_MEMORY) * (me.fix_age - me.usual_age)
     if me.fix_age <= _TARGET_LOST:
         me.known = 1
     me.target, theta = target_after(team, me, me.fix_age)
@@ -195,9 +191,8 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
         if time <= settings.turn_memory:
             me.target_turn = turned / time
             along = dot(position - me.fix, vector(1.0, me.fix_theta + 0.5 * turned)) / time
-            share = 1.0 - math.exp(-time / _SPEED_MEMORY) if me.speed_known else 1.0
+            share = 1.0 - math.exp(-time / _SPEED_MEMORY)
             me.target_speed = clip(me.target_speed + share * (along - me.target_speed), 0.0, me.max_speed)
-            me.speed_known = 1
     me.fix, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
 
 
@@ -205,7 +200,6 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
 def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
     """Update the table of team-mates (N,) with an observation (F,)."""
     at, dt = team.at, team.world.dt
-    me.usual_gap -= me.usual_gap * min(1.0, dt / _GAP_MEMORY)
     if not team.settings.radio:
         return
     me.horizon = 0.0
@@ -215,16 +209,12 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         if number < 0:
             continue
         # Nearest first: others are farther away than the last of the list, or not heard.
-        if age < _LOST_AFTER:
+        if age < team.world.patience:
             me.horizon = away
         mate = mates[number]
         sent = me.step - round(age / dt)
         if sent <= mate.step:
             continue
-        if mate.step >= 0:
-            gap = float((sent - mate.step) * dt + age)
-            if gap < _LOST_AFTER:
-                me.usual_gap = max(me.usual_gap, gap)
         mate.step, mate.heard = sent, me.step
         mate.position = me.position + scaled(pair(row, at.neighbour_bearing + k) * me.heading, away)
         heading = pair(row, at.neighbour_heading + k) * me.heading
@@ -239,19 +229,38 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
 
 
 @compiled
+def foresee(team: Team, me: Record) -> None:
+    """Take the own pose and the target to the moment at which the next command is executed, after monitoring."""
+    delay, dt = int(team.world.delay), float(team.world.dt)
+    if delay == 0:
+        return
+    for k in range(delay):
+        waiting = me.waiting[(me.step + k) % delay]
+        change, turn_change = me.acceleration * dt, me.turn_acceleration * dt
+        me.speed += clip(team.world.followed * (waiting.real - me.speed), -change, change)
+        me.omega += clip(team.world.followed * (waiting.imag - me.omega), -turn_change, turn_change)
+        half = vector(1.0, 0.5 * me.omega * dt)
+        me.position += scaled(me.heading * half, me.speed * dt)
+        me.heading *= half * half
+    if me.known:
+        me.target, me.target_theta = target_after(team, me, me.fix_age + team.world.lead)
+        me.target_velocity = vector(me.target_speed, me.target_theta)
+        me.frame *= vector(1.0, me.psi_rate * team.world.lead)
+
+
+@compiled
 def place_mates(team: Team, me: Record, mates: Records) -> None:
     """Determine which team-mates count as working and in range, and where each is when the command is executed.
 
-    One that has been silent for over twice the usual time counts as stopped. Of oneself nothing is heard.
+    One that has been silent for too long counts as stopped. Of oneself nothing is heard.
     """
     me.others = 0
-    me.patience = min(_LOST_AFTER, _LEAST_PATIENCE + 2.0 * me.usual_gap)
     for j in range(len(mates)):
         mate = mates[j]
         silence = since(team, me, mate.step)
         mate.place = mate.position
-        if silence <= me.patience:
+        if silence <= team.world.patience:
             mate.place = mate.position + scaled(mate.velocity, silence + team.world.lead)
-        mate.there = mate.step >= 0 and silence <= me.patience
+        mate.there = mate.step >= 0 and silence <= team.world.patience
         me.others += mate.there
     mates[me.number].place = me.position

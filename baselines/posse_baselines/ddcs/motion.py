@@ -23,12 +23,11 @@ from posse_baselines.laws import formation, guidance, steering
 from posse_baselines.laws.geometry import angle_of, clip, length, scaled, unit, vector, wrap
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
-_FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 
 
-# --- the tasks -----------------------------------------------------------------------------------
+# --- the guide -----------------------------------------------------------------------------------
 
 
 @compiled
@@ -40,6 +39,47 @@ def follows(team: Team, me: Record, mates: Records) -> bool:
     leader = mates[me.leader]
     # A silent leader that cannot be replaced is followed at its last known position.
     return bool(leader.there) or (settings.forbidden[FLOCKING, EXCHANGING] != 0 and leader.step >= 0)
+
+
+class Guide(NamedTuple):
+    """The robot by which a tracker has its place, as that robot moves now: the target, or the leader."""
+
+    leads: bool
+    """It is the leader."""
+    position: complex
+    velocity: complex
+    frame: complex
+    """Heading of the frame that the formation is kept in: the slot frame, or the leader's own (figure 6)."""
+    frame_rate: float
+    """rad/s"""
+    arm: complex
+    """From it to the own place, m."""
+
+
+@compiled
+def guide_of(team: Team, me: Record, mates: Records) -> Guide:
+    """Return the robot by which a tracker has its place.
+
+    A leader that has been silent for too long counts as stopped. In the first step, it is expected to move as the
+    target.
+    """
+    position, velocity = complex(me.target), complex(me.target_velocity)
+    frame, rate, slot = complex(me.frame), float(me.psi_rate), complex(team.slots[me.slot])
+    leads = follows(team, me, mates)
+    if leads:
+        leader = mates[me.leader]
+        age, speed, turn = since(team, me, leader.step), 0.0, 0.0
+        heading = complex(leader.heading)
+        if age <= team.world.patience:
+            speed, turn = float(length(leader.velocity) if leader.step > 0 else me.target_speed), float(leader.turn)
+            heading *= vector(1.0, turn * (age + team.world.lead))
+        position, velocity, slot = leader.place, scaled(heading, speed), slot - team.slots[0]
+        if not team.settings.by_slot_frame:
+            frame, rate = heading, turn
+    return Guide(leads, position, velocity, frame, rate, slot * frame)
+
+
+# --- the tasks -----------------------------------------------------------------------------------
 
 
 @compiled
@@ -55,15 +95,11 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
     elif me.exchanges > 0 and me.confirmed == 0 and task != SEARCHING:
         wanted = EXCHANGING
     else:
-        near, far = settings.near, settings.far
-        if follows(team, me, mates):
-            error = length(place_by(team, me, mates[me.leader]).place - me.position)
-        elif settings.pngl:
+        guide = guide_of(team, me, mates)
+        near, far, error = settings.near, settings.far, length(guide.position + guide.arm - me.position)
+        if settings.pngl and not guide.leads:
             near, far = settings.range_near, settings.range_far
-            arm = team.slots[me.slot] * me.frame
-            error = length(me.target - me.position) - length(arm)
-        else:
-            error = length(me.target + team.slots[me.slot] * me.frame - me.position)
+            error = length(guide.position - me.position) - length(guide.arm)
         wanted = FLOCKING if error <= (far if task == FLOCKING else near) else CONVERGING
     return task if settings.forbidden[task, wanted] else wanted
 
@@ -87,38 +123,33 @@ def move(team: Team, me: Record, mates: Records) -> None:
         want(me, explore(team, me, mates))
     elif me.task == EXCHANGING:
         want(me, me.target_velocity, me.target_turn)
-    elif me.fix_age > me.usual_age + settings.close_in_after and team.world.sight < _FAR_SIGHT:
+    elif me.fix_age > team.world.patience + settings.close_in_after:
         # To where the target is predicted, to see it again.
         way = me.target - me.position
         want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))))
-    elif follows(team, me, mates):
-        if me.task == FLOCKING:
-            follow(team, me, mates)
-        else:
-            ref = place_by(team, me, mates[me.leader])
-            slot = steering.slot_velocity(vector(ref.speed, ref.theta), ref.frame_rate, ref.place - ref.position)
-            way = ref.place - me.position
-            want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration))
-    elif settings.pngl:
-        pursue(team, me)
     else:
-        hold_slot(team, me)
+        guide = guide_of(team, me, mates)
+        if guide.leads and me.task == FLOCKING:
+            follow(team, me, guide)
+        elif settings.pngl and not guide.leads:
+            pursue(team, me)
+        else:
+            take_place(team, me, guide)
 
 
 @compiled
-def hold_slot(team: Team, me: Record) -> None:
-    """Set the motion that takes up the slot on the target (converging) or keeps it (flocking).
+def take_place(team: Team, me: Record, guide: Guide) -> None:
+    """Set the motion that takes up the own place by the guide (converging) or keeps it (flocking): the slot law.
 
-    Converging: intercept at full speed, around the target; flocking: the slot law.
+    Converging: intercept at full speed, around the target.
     """
     settings = team.settings
-    arm = team.slots[me.slot] * me.frame + scaled(me.frame, settings.aim_ahead)
-    start, gain, clearance = me.position - me.target, settings.gain, 0.0
+    arm = guide.arm + scaled(me.frame, settings.aim_ahead)
+    start, goal, gain = me.position - me.target, guide.position + arm - me.target, settings.gain
     if me.task == CONVERGING:
-        gain, clearance = _FULL_SPEED, settings.clearance
-    way = steering.way_round(start, arm, clearance) - start
-    slot = steering.slot_velocity(me.target_velocity, me.psi_rate, arm)
-    want(me, steering.approach_velocity(way, slot, gain, me.max_speed, me.acceleration))
+        goal, gain = steering.way_round(start, goal), _FULL_SPEED
+    slot = steering.slot_velocity(guide.velocity, guide.frame_rate, arm)
+    want(me, steering.approach_velocity(goal - start, slot, gain, me.max_speed))
 
 
 @compiled
@@ -160,64 +191,23 @@ def pursue(team: Team, me: Record) -> None:
     want(me, vector(speed, sigma + delta), guidance.lawful_rate(constant, sigma_rate, frame_rate))
 
 
-# --- following -----------------------------------------------------------------------------------
-
-
-class Reference(NamedTuple):
-    """The leader as it moves now, and a follower's place by it."""
-
-    position: complex
-    speed: float
-    theta: float
-    place: complex
-    """Where the follower is wanted."""
-    frame: float
-    """Heading (rad) of the frame that the formation is kept in: the leader's own (figure 6), or the slot frame."""
-    frame_rate: float
-    """rad/s"""
-
-
 @compiled
-def place_by(team: Team, me: Record, leader: Record) -> Reference:
-    """Return the leader as it moves now, and the own place by it.
-
-    One that has been silent for too long counts as stopped. In the first step, it is expected to move as the target.
-    """
-    theta, age = angle_of(leader.heading), since(team, me, leader.step)
-    speed, rate = 0.0, 0.0
-    if age <= me.patience:
-        speed, rate = float(length(leader.velocity) if leader.step > 0 else me.target_speed), float(leader.turn)
-        theta = wrap(theta + rate * (age + team.world.lead))
-    frame = theta
-    if team.settings.by_slot_frame:
-        frame, rate = angle_of(me.frame), float(me.psi_rate)
-    place = leader.place + (team.slots[me.slot] - team.slots[0]) * vector(1.0, frame)
-    return Reference(leader.place, speed, theta, place, frame, rate)
-
-
-@compiled
-def follow(team: Team, me: Record, mates: Records) -> None:
+def follow(team: Team, me: Record, guide: Guide) -> None:
     """Set the motion of a follower in the flock by l-φ on the leader: velocity of c_j, and its command.
 
     c_j is wanted where it lies when the robot is in its place, and heads as one does there.
     """
     settings, offset = team.settings, team.settings.point_offset
-    ref = place_by(team, me, mates[me.leader])
-    arm = ref.place - ref.position
-    heading = steering.slot_heading(vector(ref.speed, ref.theta), ref.frame_rate, arm, ref.frame)
-    now = me.position + scaled(me.heading, offset) - ref.position
-    wanted, back = arm + vector(offset, heading), vector(1.0, -ref.theta)
-    velocity = formation.l_phi_velocity(
-        now * back,
-        wanted * back,
-        ref.theta - angle_of(me.heading),
-        ref.speed,
-        ref.frame_rate,
+    heading = steering.slot_heading(guide.velocity, guide.frame_rate, guide.arm, angle_of(guide.frame))
+    me.wish = formation.l_phi_velocity(
+        me.position + scaled(me.heading, offset) - guide.position,
+        guide.arm + vector(offset, heading),
+        guide.velocity,
+        guide.frame_rate,
         formation.sampled_rate(settings.alpha_1, me.dt),
         formation.sampled_rate(settings.alpha_2, me.dt),
     )
-    me.wish = velocity * me.heading
-    speed, omega = formation.held_command(velocity, offset, me.dt)
+    speed, omega = formation.held_command(me.wish * me.heading.conjugate(), offset, me.dt)
     me.wish_speed, me.wish_omega = formation.limit_command(me, speed, omega, offset)
 
 

@@ -26,7 +26,7 @@ from posse_baselines.ddcs.memory import Team, is_due, since
 from posse_baselines.ddcs.monitoring import COUNT, is_newer
 from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
 from posse_baselines.laws.geometry import dot, length, unit
-from posse_baselines.laws.steering import Work, assign, intercept_time
+from posse_baselines.laws.steering import Work, assign
 
 REPLAN_TIME: Final = 0.5
 """s. Time between two assignments."""
@@ -105,7 +105,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
             best, least = nearest_tracker(team, me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
-    elif since(team, me, me.pulse_step) > me.patience + settings.lead_patience:
+    elif since(team, me, me.pulse_step) > team.world.patience + settings.lead_patience:
         select_leader(team, me, mates)
 
 
@@ -114,7 +114,7 @@ def slot_cost(team: Team, me: Record, position: complex, heading: complex, k: in
     """Return the time (s) that a tracker takes to slot k, less what the slot is worth."""
     slot = team.slots[k]
     way = me.target + slot * me.frame - position
-    time = intercept_time(way, me.target_velocity, me.max_speed)
+    time = length(way) / me.max_speed
     # Time for turning towards it, up to half a turn.
     facing = dot(unit(way), heading)
     time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)

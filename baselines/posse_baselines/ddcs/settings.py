@@ -51,8 +51,6 @@ class Settings:
     """Decay time constant of a measured turn rate of the target."""
     heading_trust: float = tuned(1.0, "", 0.02, 1.0)
     """Share of a new measurement in the slot frame's estimated heading. The target's has the same noise."""
-    frame_trust: float = tuned(0.5, "", 0.02, 1.0)
-    """Where poses drift: share of a new measurement in the offset between a team-mate's frame and the own one."""
 
     # the tasks
     time_lag: float = tuned(1.0, "s", 0.1, 10.0)
@@ -76,8 +74,8 @@ class Settings:
 
     # slots
     close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
-    """With a fix older than this, beyond the usual age, the team moves to the predicted position of the target, to see
-    it again."""
+    """With a fix older than this, beyond the patience with silent team-mates, the team moves to the predicted position
+    of the target, to see it again."""
 
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)
@@ -87,8 +85,6 @@ class Settings:
     detour: float = tuned(0.0, "m", 0.0, 1.0)
     """Clearance of ways past obstacles on the way to a slot or in the search; 0: no detours, the
     safeguard alone avoids them."""
-    clearance: float = tuned(0.75, "m", 0.3, 2.0)
-    """Distance at which the path to a slot leads around the target."""
     bearing_gain: float = tuned(0.0, "", 0.0, 4.0)
     """G of a deviation c = ... + G wrap(σ - σ_d): feedback on the bearing. 0 is the paper's law."""
     range_gain: float = tuned(1.0, "1/s", 0.1, 6.0)

@@ -23,29 +23,27 @@ from __future__ import annotations
 import math
 
 from posse.numeric import Record, compiled
-from posse_baselines.laws.geometry import angle_of, clip, length, vector, wrap
+from posse_baselines.laws.geometry import angle_of, clip, length, unit
 
 
 @compiled
 def l_phi_velocity(
-    now: complex, wanted: complex, turned: float, leader_speed: float, frame_rate: float, alpha_1: float, alpha_2: float
+    now: complex, wanted: complex, leader: complex, frame_rate: float, alpha_1: float, alpha_2: float
 ) -> complex:
-    """Return the velocity v_j + i d ω_j (m/s) wanted of a control point.
+    """Return the velocity (m/s) wanted of a control point that is, and is wanted, at a position (m) from the leader.
 
-    It is, and is wanted, at a position (m) in the leader's own axes. It moves at A along the line of l, and B to its
-    left::
+    It moves at A along the line of l, and at B to its left; v_j + i d ω_j is that in the follower's own axes::
 
         A =   α_1 (l_d - l)           + v_i cos(φ)        v_j   = A cos(γ) - B sin(γ)
         B = l α_2 wrap(φ_d - φ)   - v_i sin(φ) + l ω_i    d ω_j = A sin(γ) + B cos(γ)
 
-    With it, l - l_d decays as exp(-α_1 t) and φ - φ_d as exp(-α_2 t). No γ is singular. ``turned`` (rad) is θ_i - θ_j;
-    ``frame_rate`` (rad/s) is ω_i where φ_d is constant in the leader's frame, and dψ/dt where it follows the slot
-    frame.
+    With it, l - l_d decays as exp(-α_1 t) and φ - φ_d as exp(-α_2 t). No γ is singular. ``leader`` is its velocity
+    (m/s); ``frame_rate`` (rad/s) is ω_i where φ_d is constant in the leader's frame, and dψ/dt where it follows the
+    slot frame.
     """
-    l, phi = length(now), angle_of(now)  # noqa: E741
-    along = alpha_1 * (length(wanted) - l) + leader_speed * math.cos(phi)
-    turning = alpha_2 * wrap(angle_of(wanted) - phi) + frame_rate
-    return complex(along, l * turning - leader_speed * math.sin(phi)) * vector(1.0, phi + turned)
+    l, line = length(now), unit(now)  # noqa: E741
+    turning = alpha_2 * angle_of(wanted * line.conjugate()) + frame_rate
+    return leader + complex(alpha_1 * (length(wanted) - l), l * turning) * line
 
 
 @compiled

@@ -41,10 +41,8 @@ from posse_baselines.laws.geometry import angle_of, clip, dot, length, wrap
 
 MIN_COSINE: Final = 0.6
 """With a smaller cosine of its deviation a tracker hardly changes the range."""
-BRAKING_SHARE: Final = 0.8
-"""Of the greatest deceleration, which a planned approach or turn uses."""
-
 _MIN_RANGE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
+_BRAKING: Final = 0.8  # share of the greatest deceleration that a planned turn uses
 _STANDSTILL: Final = 1e-3  # m/s
 
 UNLIMITED: Final = 1e4
@@ -132,7 +130,7 @@ def heading_error(body: Record, v: complex) -> float:
 @compiled
 def turn_command(body: Record, error: float, time: float) -> float:
     """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
-    most = math.sqrt(2.0 * BRAKING_SHARE * body.turn_acceleration * abs(error))
+    most = math.sqrt(2.0 * _BRAKING * body.turn_acceleration * abs(error))
     return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
 
 

@@ -16,8 +16,8 @@ from posse.numeric import Record, Records, compiled, record_type
 from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector, wrap
 from posse_baselines.laws.guidance import heading_error, turn_command
 
-NEAR: Final = 3.0
-"""m. Objects farther away are no danger yet."""
+_NEAR: Final = 2.7
+"""m. What is farther from a contact is no danger yet."""
 WALLS: Final = np.array((1.0, -1.0, 1.0j, -1.0j))
 """Outward normals of the walls."""
 
@@ -57,18 +57,13 @@ DISC: Final = record_type(
 
 @compiled
 def put_disc(discs: Records, count: int, place: complex, velocity: complex, reach: float, margin: float) -> int:
-    """Add a disc to a list of ``count``, unless it is full; return the new count."""
-    if count >= len(discs):
+    """Add a disc to a list of ``count`` if it is near, unless the list is full; return the new count."""
+    near = _NEAR + reach
+    if count >= len(discs) or dot(place, place) >= near * near:
         return count
     d = discs[count]
     d.place, d.velocity, d.reach, d.margin, d.turn = place, velocity, reach, margin, 0.0
     return count + 1
-
-
-@compiled
-def put_near(discs: Records, count: int, place: complex, velocity: complex, reach: float, margin: float) -> int:
-    """Add a robot as a disc if it is near; return the new count."""
-    return put_disc(discs, count, place, velocity, reach, margin) if dot(place, place) < NEAR * NEAR else count
 
 
 @compiled
@@ -84,10 +79,8 @@ def to_wall(arena: Record, k: int, position: complex) -> float:
 def put_walls(discs: Records, count: int, arena: Record, position: complex, radius: float, margin: float) -> int:
     """Add those walls of an arena (:func:`to_wall`) that are near, as very large discs; return the new count."""
     for k in range(4):
-        away = to_wall(arena, k, position)
-        if away < NEAR:
-            place = scaled(WALLS[k], away - radius + _PLANET)
-            count = put_disc(discs, count, place, 0j, _PLANET, margin)
+        place = scaled(WALLS[k], to_wall(arena, k, position) - radius + _PLANET)
+        count = put_disc(discs, count, place, 0j, _PLANET, margin)
     return count
 
 

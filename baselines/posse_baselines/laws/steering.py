@@ -1,4 +1,4 @@
-"""Slots: their motion, interception, the law that takes up and holds one, who takes which; and pushes in the search.
+"""Slots: their motion, the law that takes up and holds one, who takes which; and pushes in the search.
 
 A slot is an arm (m) from a leader or the target, in a frame that turns with it: the slot frame ψ, or the leader's own
 heading. In a turning frame each slot moves on its own circle.
@@ -13,17 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import MOST_THREADS, Records, compiled
-from posse_baselines.laws.geometry import angle_of, clip, cross, dot, length, scaled, vector
-from posse_baselines.laws.guidance import BRAKING_SHARE
+from posse_baselines.laws.geometry import angle_of, cross, dot, length, scaled, vector
 from posse_baselines.laws.safeguard import DISC
 
-NEVER: Final = 1e6
-"""s. Value for no interception."""
 WORK_ROWS: Final = 7
 """Rows of the work array of :func:`assign`."""
 
 _SLOW: Final = 1e-2  # m/s; below it a slot's direction of motion is undefined
 _MIN_DISTANCE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
+_CLEARANCE: Final = 0.75  # m; that a path keeps from the target
 _LEAST_TURN: Final = 0.6  # rad; least angle ahead on the circle for a tracker on or inside it
 _CLOSE: Final = np.float32(0.5)  # m; a nearer team-mate pushes as one at this distance
 _MOST_DISCS: Final = 32
@@ -70,17 +68,14 @@ def slot_heading(velocity: complex, frame_rate: float, arm: complex, resting: fl
 
 
 @compiled
-def approach_velocity(way: complex, slot: complex, gain: float, max_speed: float, deceleration: float) -> complex:
+def approach_velocity(way: complex, slot: complex, gain: float, max_speed: float) -> complex:
     """Return the wanted velocity (m/s) of a tracker whose slot lies ``way`` (m) off: the slot law.
 
-    The slot's velocity (m/s) plus ``gain`` (1/s, below 1 / control step) times the way, the gain lowered where the
-    tracker, which brakes by at most ``deceleration`` (m/s²), could not stop in time. Where that is more than
+    The slot's velocity (m/s) plus ``gain`` (1/s, below 1 / control step) times the way. Where that is more than
     ``max_speed``, the part along the way is shortened until it is not: the tracker moves at full speed on the straight
     intercept course of a slot of constant velocity. A slot faster than the tracker is followed in its own direction.
     """
     distance = length(way)
-    if distance > 1e-6:
-        gain = min(gain, math.sqrt(2.0 * BRAKING_SHARE * deceleration / distance))
     approach = gain * distance
     unit = complex(way.real / max(distance, _MIN_DISTANCE), way.imag / max(distance, _MIN_DISTANCE))
     opening = dot(slot, unit)
@@ -93,32 +88,18 @@ def approach_velocity(way: complex, slot: complex, gain: float, max_speed: float
 
 
 @compiled
-def intercept_time(way: complex, velocity: complex, max_speed: float) -> float:
-    """Return the earliest interception time (s) of a point, straight at ``max_speed``; ``NEVER`` if there is none.
-
-    The point is ``way`` (m) off and moves at a constant velocity (m/s): the least root t >= 0 of ``|p + s t| = V t``.
-    """
-    surplus = max_speed**2 - velocity.real**2 - velocity.imag**2
-    opening, square = dot(way, velocity), dot(way, way)
-    if surplus <= 1e-9:
-        return NEVER if opening >= 0.0 else min(NEVER, -0.5 * square / opening)
-    time = (opening + math.sqrt(opening**2 + surplus * square)) / surplus
-    return clip(time, 0.0, NEVER)
-
-
-@compiled
-def way_round(start: complex, goal: complex, clearance: float) -> complex:
+def way_round(start: complex, goal: complex) -> complex:
     """Return the next waypoint from one position to another around the origin (m).
 
-    The goal itself if the straight path keeps ``clearance`` from the origin; else the tangent point
+    The goal itself if the straight path keeps a clearance of 0.75 m from the origin; else the tangent point
     on that circle, on the shorter side. A tracker on the circle heads for a point a little further
     along it, and comes no nearer than 0.82 of the clearance.
     """
     way = goal - start
     square, along, crossing = dot(way, way), -dot(start, way), cross(start, way)
-    if along <= 0.0 or along >= square or crossing * crossing >= clearance * clearance * square:
+    if along <= 0.0 or along >= square or crossing * crossing >= _CLEARANCE * _CLEARANCE * square:
         return goal
-    scale = clearance / max(length(start), 1e-6)
+    scale = _CLEARANCE / max(length(start), 1e-6)
     angle = max(math.acos(min(1.0, scale)), _LEAST_TURN)
     return scaled(start * vector(1.0, -angle if crossing < 0.0 else angle), scale)
 

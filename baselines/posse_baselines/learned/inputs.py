@@ -14,9 +14,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse import ObservationLayout, Scenario
+from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, kernel, over_worlds
-from posse_baselines.ddcs.memory import offsets_of
+from posse_baselines.ddcs.memory import offsets_of, patience_of
 from posse_baselines.laws.steering import work_for, work_of
 from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, Known, write_features
 from posse_baselines.policy import PolicyError, check_observations
@@ -24,8 +24,6 @@ from posse_baselines.policy import PolicyError, check_observations
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
 _SHARE: Final = 0.25  # of a new fix in the estimate of the target, where fixes are noisy
-_HARDLY: Final = 1e-3  # probability
-_RADIO_FAILS: Final = 3.0  # s; where radios fail, a silent robot may go on
 
 
 class EncodedField(NamedTuple):
@@ -148,7 +146,7 @@ class Encoder(OwnArrays):
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
         noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
-        share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(_patience(layout.scenario))
+        share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(patience_of(layout.scenario))
         half = complex(*layout.scenario.half_sides)
         self._for_features = Known(offsets_of(layout), slots, half, first, share, patience), *work
 
@@ -179,14 +177,6 @@ class Encoder(OwnArrays):
         read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
         read[:, missing] = self._unknown[missing]
         return out
-
-
-def _patience(scenario: Scenario) -> float:
-    """Return the silence (s) after which a robot is taken for broken: losses hardly explain it."""
-    if scenario.radio_outages > 0.0:
-        return _RADIO_FAILS
-    lost = math.log(_HARDLY) / math.log(scenario.radio_loss) if scenario.radio_loss > 0.0 else 0.0
-    return (scenario.radio_delay + lost + 1.5) * scenario.control_step
 
 
 @kernel

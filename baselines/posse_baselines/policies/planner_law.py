@@ -16,23 +16,14 @@ from posse import Batch
 from posse.numeric import BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds, record_type
 from posse.rules import NEVER
 from posse_baselines.ddcs.memory import record
-from posse_baselines.laws.geometry import angle_of, dot, wrap
+from posse_baselines.laws.geometry import angle_of, length, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
-from posse_baselines.laws.safeguard import NEAR, put_disc, put_near, put_walls, safe_velocity
-from posse_baselines.laws.steering import (
-    Work,
-    approach_velocity,
-    assign,
-    intercept_time,
-    slot_velocity,
-    way_round,
-    work_of,
-)
+from posse_baselines.laws.safeguard import put_disc, put_walls, safe_velocity
+from posse_baselines.laws.steering import Work, approach_velocity, assign, slot_velocity, way_round, work_of
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
 _TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
-_CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
 _MARGIN: Final = 0.15  # m; free width that is kept; twice as much to the target
 
 WAY: Final = record_type(
@@ -94,7 +85,7 @@ def assign_slots(teams: Teams, worlds: Any, e: int, work: Work) -> None:
             continue
         for k in range(n):
             way = complex(w.x, w.y) + arm_of(w, teams.slots[k]) - complex(t.x, t.y)
-            time = intercept_time(way, velocity_of(w), float(t.max_speed))
+            time = length(way) / float(t.max_speed)
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
             time += teams.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
@@ -112,28 +103,24 @@ def surround(c: Record, worlds: Any, e: int, i: int, discs: Records) -> int:
     """List what is near tracker i of world e, as discs for the safeguard; return how many things that are."""
     w, t = worlds.world[e], worlds.tracker[e, i]
     here, count, two = complex(t.x, t.y), 0, 2.0 * c.robot_radius
-    count = put_near(discs, count, complex(w.x, w.y) - here, velocity_of(w), two, 2.0 * _MARGIN)
+    count = put_disc(discs, count, complex(w.x, w.y) - here, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
         other = worlds.tracker[e, j]
         if j != i:
-            count = put_near(discs, count, complex(other.x, other.y) - here, velocity_of(other), two, _MARGIN)
+            count = put_disc(discs, count, complex(other.x, other.y) - here, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
         disc = worlds.obstacle[e, k]
-        way, reach = complex(disc.x, disc.y) - here, disc.radius + c.robot_radius
-        if dot(way, way) < (NEAR + reach) * (NEAR + reach):
-            count = put_disc(discs, count, way, 0j, reach, _MARGIN)
-    if c.walled:
-        count = put_walls(discs, count, c, here, c.robot_radius, _MARGIN)
-    return count
+        count = put_disc(discs, count, complex(disc.x, disc.y) - here, 0j, disc.radius + c.robot_radius, _MARGIN)
+    return put_walls(discs, count, c, here, c.robot_radius, _MARGIN)
 
 
 @compiled
-def wanted_velocity(w: Record, t: Record, way: Record, slot: complex, frame_rate: float, most: float) -> complex:
-    """Return the velocity (m/s) that meets a slot on a course round the target; ``most``: deceleration, m/s²."""
+def wanted_velocity(w: Record, t: Record, way: Record, slot: complex, frame_rate: float) -> complex:
+    """Return the velocity (m/s) that meets a slot on a course round the target."""
     arm, start = arm_of(w, slot), complex(t.x, t.y) - complex(w.x, w.y)
     aim = arm + complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     velocity = slot_velocity(velocity_of(w), frame_rate, aim)
-    return approach_velocity(way_round(start, aim, _CLEARANCE) - start, velocity, way.gain, float(t.max_speed), most)
+    return approach_velocity(way_round(start, aim) - start, velocity, way.gain, float(t.max_speed))
 
 
 @compiled
@@ -160,7 +147,7 @@ def drive_team(teams: Teams, worlds: Any, e: int, work: Work, actions: FloatArra
         me.max_speed, me.max_omega, me.dt = t.max_speed, t.max_turn_rate, c.control_step
         me.acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else UNLIMITED
         me.turn_acceleration = 1.0 / c.per_turn_acceleration if c.per_turn_acceleration > 0.0 else UNLIMITED
-        velocity = wanted_velocity(w, t, teams.ways[e, i], teams.slots[me.slot], frame_rate, me.acceleration)
+        velocity = wanted_velocity(w, t, teams.ways[e, i], teams.slots[me.slot], frame_rate)
         me.wish, _ = safe_velocity(me, work.discs[: surround(c, worlds, e, i, work.discs)], velocity)
         v, omega = regulate(me, me.wish)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it

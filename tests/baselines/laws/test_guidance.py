@@ -146,7 +146,8 @@ def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
 ) -> None:
     assume(abs(short_way(phi_d - phi)) < math.pi - 1e-6)  # at half a turn either way is right
     now, wanted = cmath.rect(l_now, phi), cmath.rect(l_d, phi_d)
-    velocity = formation.l_phi_velocity(now, wanted, turned, leader_speed, leader_omega, 2.0, 1.5)
+    back = cmath.rect(1.0, turned)  # from the leader's axes
+    velocity = formation.l_phi_velocity(now * back, wanted * back, leader_speed * back, leader_omega, 2.0, 1.5)
     along = velocity * cmath.exp(-1j * (phi + turned))  # along l, and across it
     leader = cmath.rect(leader_speed, -phi)
     assert along.real - leader.real == pytest.approx(2.0 * (l_d - l_now), abs=1e-9)
