@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from posse import Command, Robot
-from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.policy import Policy, PolicyError, check_policy
 
 
 class deploy:  # noqa: N801 (used as a function is)
@@ -18,10 +18,11 @@ class deploy:  # noqa: N801 (used as a function is)
 
     Raises:
         PolicyError: The policy reads the state of the worlds or the observations of all trackers together
-            (``whole_team``), or does not fit the robot's scenario.
+            (``whole_team``), or does not fit the robot's scenario; TypeError if it is no policy.
     """
 
     def __init__(self, policy: Policy, robot: Robot) -> None:
+        check_policy(policy)
         if policy.reads_state:
             raise PolicyError(f"policy {policy.name!r} reads the state of the worlds, which no robot measures")
         if getattr(policy, "whole_team", False):

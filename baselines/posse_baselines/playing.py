@@ -104,9 +104,9 @@ class Recorder:
         ValueError: An unknown name, or one of a frame with ``autoreset="same_step"``, which overwrites the last one.
     """
 
-    def __init__(self, batch: Batch, record: Iterable[str] = ()) -> None:
+    def __init__(self, batch: Batch, record: str | Iterable[str] = ()) -> None:
         self.batch = batch
-        names, state = tuple(record), tuple(batch.state)
+        names, state = (record,) if isinstance(record, str) else tuple(record), tuple(batch.state)
         known = (*_FRAMES, *_STEPS, "state", *state)
         for name in names:
             if name not in known:
@@ -221,7 +221,7 @@ def _moving(batch: Batch) -> Batch:
 def rollout(
     batch: Batch,
     policy: Policy,
-    record: Collection[str] = (),
+    record: str | Collection[str] = (),
     *,
     steps: int | None = None,
     seed: int | None = None,
@@ -233,7 +233,7 @@ def rollout(
     Args:
         batch: The worlds.
         policy: Moves the trackers; what moves the target is inside the batch (:func:`batch_for`).
-        record: Names of arrays, listed in :class:`Trajectory`; its metrics are always there.
+        record: Names of arrays, or one, listed in :class:`Trajectory`; its metrics are always there.
         steps: How many to play, through the ends of episodes; default: until the first episode of every world has
             ended. With autoreset disabled, it ends there in any case.
         seed: As for :meth:`posse.Batch.reset`.

@@ -13,6 +13,7 @@ memory passed to ``act`` or ``restart`` must not be used again; use the one that
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -106,13 +107,18 @@ def check_observations(observations: npt.ArrayLike, robots: tuple[int, ...], lay
     return array
 
 
+def check_policy(policy: object) -> None:
+    """Raise TypeError for what is no policy."""
+    if not isinstance(policy, Policy):
+        raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; load() takes names")
+
+
 def begin(policy: Policy, batch: Batch) -> Memory:
     """Return the memory of a policy for a batch; a policy with ``reads_state = True`` first gets the batch.
 
-    A TypeError says that something is no policy, such as a name.
+    TypeError for what is no policy, such as a name.
     """
-    if not isinstance(policy, Policy):
-        raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; load() takes names")
+    check_policy(policy)
     if policy.reads_state and hasattr(policy, "watch"):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
@@ -138,6 +144,8 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         message_size: int = 0,
         discrete_actions: bool = False,
     ) -> None:
+        if not callable(function):
+            raise TypeError(f"from_function takes a function, got {reprlib.repr(function)}")
         self.name = getattr(function, "__name__", "function") if name is None else name
         self.message_size = message_size
         self._function = function

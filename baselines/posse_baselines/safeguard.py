@@ -18,10 +18,11 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
-from posse import ObservationLayout
+from posse import Batch, ObservationLayout
 from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import guard_all
@@ -59,7 +60,8 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
             not; or one of ``posse/Team-v0``, ``posse/Solo-v0`` and ``posse/Tracker-v0``.
 
     Raises:
-        PolicyError: Discrete actions, which are no velocities; observations or actions that a wrapper changes.
+        PolicyError: Discrete actions, which are no velocities; observations or actions that a wrapper changes; an
+            environment that is guarded already.
         TypeError: Something else.
     """
     guarded: Any
@@ -72,6 +74,8 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         own = env.unwrapped.action_space, env.unwrapped.observation_space
     else:
         raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
+    if env.has_wrapper_attr("guard") if isinstance(env, gymnasium.Env) else hasattr(env, "guard"):
+        raise PolicyError("the environment is behind the safeguard already: guard it once")
     if not isinstance(space, spaces.Box):
         raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
     if (space, seen) != own:
@@ -79,20 +83,32 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
     return guarded(env)
 
 
-class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
+def _check_running(batch: Batch, guard: Guard | None) -> None:
+    batch.check_running()
+    if guard is None:
+        raise ResetNeeded("step before reset: call reset() of the guarded environment first")
+
+
+class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
     """A Gymnasium environment behind the safeguard."""
+
+    guard: Any = None
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        gymnasium.utils.RecordConstructorArgs.__init__(self)  # which env.spec needs
+        super().__init__(env)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._seen = np.array(observation, ndmin=3)
-        self._guard = Guard(self.get_wrapper_attr("layout"), 1, self._seen.shape[1])
+        self.guard = Guard(self.get_wrapper_attr("layout"), 1, self._seen.shape[1])
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Advance by one control step with wanted velocities."""
-        self.get_wrapper_attr("batch").check_running()
-        motions = self._guard.actions(self._seen, self.get_wrapper_attr("actions_of")(action))
+        _check_running(self.get_wrapper_attr("batch"), self.guard)
+        motions = self.guard.actions(self._seen, self.get_wrapper_attr("actions_of")(action))
         observation, *rest = self.env.step(motions.reshape(self.action_space.shape or ()))
         self._seen = np.array(observation, ndmin=3)
         return observation, *rest
@@ -101,17 +117,19 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
     """A PettingZoo environment whose trackers are behind the safeguard."""
 
+    guard: Any = None
+
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode."""
         observations, infos = self.env.reset(seed=seed, options=options)
-        self._seen, self._guard = stack_agents(observations), Guard(self.env.unwrapped.layout, 1)
+        self._seen, self.guard = stack_agents(observations), Guard(self.env.unwrapped.layout, 1)
         return observations, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
-        self.env.unwrapped.batch.check_running()
+        _check_running(self.env.unwrapped.batch, self.guard)
         wanted = self.env.unwrapped.actions_of(actions)[:, : self._seen.shape[1]]
-        safe = split_agents(self._guard.actions(self._seen, wanted), actions)
+        safe = split_agents(self.guard.actions(self._seen, wanted), actions)
         result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **safe})
         self._seen = stack_agents(result[0])
         return result

@@ -10,7 +10,7 @@ import numpy as np
 from posse import Batch, PairedBatch, Scenario, ScenarioError
 from posse.adapters.gymnasium_env import TeamEnv, team_scenario
 from posse.adapters.vector_env import TeamVectorEnv
-from posse_baselines.policy import Policy
+from posse_baselines.policy import Policy, check_policy
 from posse_baselines.registry import load
 
 
@@ -23,6 +23,7 @@ class _WithTeammates:
         self, *arguments: Any, number: int = 0, teammates: str | Policy = "ddcs-distributed", **settings: Any
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
+        check_policy(self.teammates)
         self.number = number
         super().__init__(*arguments, **settings)
 
@@ -60,7 +61,7 @@ class TrackerEnv(_WithTeammates, TeamEnv):
     Raises:
         ScenarioError: An unknown or invalid setting, a team of one, a target that is an agent, ``number`` not in the
             team.
-        PolicyError: Unknown team-mates.
+        PolicyError: Unknown team-mates; TypeError if they are no policy.
     """
 
 

@@ -151,7 +151,10 @@ def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
         assert one.metrics["score"] == alone.metrics["score"]
 
 
-def test_what_cannot_be_recorded_is_named() -> None:
+def test_what_cannot_be_recorded_or_played_is_named() -> None:
+    for wrong in ("idle", None):
+        with pytest.raises(TypeError, match="is no policy"):
+            rollout(posse.batch("constant", 1), wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="record='speed' is unknown; names are: observations, "):
         rollout(posse.batch("constant", 1), load("idle"), ["speed"])
     with pytest.raises(ValueError, match="autoreset='same_step'"):

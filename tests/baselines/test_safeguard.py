@@ -140,6 +140,7 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     solo = Safeguard(gymnasium.make("posse/Solo-v0", scenario="smart"))
     mate = Safeguard(gymnasium.make("posse/Tracker-v0", scenario="smart", number=2))
     for env in (solo, mate):
+        assert env.spec.additional_wrappers  # which needs the wrapper's arguments
         env.reset(seed=1)
         for _ in range(5):
             observation, *_ = env.step(np.zeros(2, np.float32))
@@ -163,8 +164,11 @@ def test_invalid_environments_are_not_guarded() -> None:
         with pytest.raises(TypeError, match="no environment of posse"):
             Safeguard(other)
     for env in (Safeguard(gymnasium.make("posse/Team-v0")), Safeguard(posse.parallel_env())):
-        with pytest.raises(gymnasium.error.ResetNeeded):
+        env.unwrapped.reset()  # not that of the guarded environment
+        with pytest.raises(gymnasium.error.ResetNeeded, match="of the guarded environment"):
             env.step({})
+        with pytest.raises(PolicyError, match="guard it once"):
+            Safeguard(env)
     batch = posse.batch("smart", 1)
     for wrong, words in ((np.full((1, 5, 2), np.nan), "finite"), (0.0, "shape")):
         with pytest.raises(ValueError, match=words):

@@ -22,6 +22,7 @@ from posse_baselines.playing import batch_for
 from posse_baselines.policy import Annotations, Policy, begin
 from posse_baselines.registry import Target
 from posse_training.errors import SettingsError, require
+from posse_training.evaluation.evaluation import played_errors
 from posse_training.replay.page import PLAYERS, TASK_COLOURS
 
 _LARGEST: Final = 4096  # px, of width and height
@@ -58,9 +59,10 @@ class Team:
     def step(self) -> None:
         """Advance by one control step, unless the episode has ended."""
         if not self.over:
-            actions, self._memory = self.policy.act(self._observations, self._memory)
-            self.told = self.policy.annotations(self._memory)
-            self._observations, *_, infos = self.batch.step(actions)
+            with played_errors():
+                actions, self._memory = self.policy.act(self._observations, self._memory)
+                self.told = self.policy.annotations(self._memory)
+                self._observations, *_, infos = self.batch.step(actions)
             self.scores.append(float(infos["score"][0]))
 
 
@@ -108,6 +110,7 @@ def film(
         SettingsError: No policies, a path of another format, a number out of range.
         PolicyError: A policy that does not fit the scenario.
         MissingExtraError: An MP4 without the extra ``video``.
+        PlayError: A policy that raised, or returned invalid actions.
     """
     path, settings = Path(path), get_scenario(scenario, **overrides)
     if not policies:

@@ -33,9 +33,9 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     Args:
         scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
-        autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``: the
-            next step starts a new one and ignores its action; ``"same_step"``: a new one starts at
-            once, the last observation is ``info["final_obs"]``, the last info ``info["final_info"]``;
+        autoreset: Behaviour at the end of an episode: a mode of Gymnasium, or a name as for :func:`posse.batch`.
+            ``"next_step"``: the next step starts a new one and ignores its action; ``"same_step"``: a new one starts
+            at once, the last observation is ``info["final_obs"]``, the last info ``info["final_info"]``;
             ``"disabled"``: the caller resets, with ``options={"reset_mask": mask}``.
         settings: As for :class:`TeamEnv`.
     """
@@ -44,10 +44,16 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     _fit = staticmethod(team_scenario)
 
     def __init__(
-        self, scenario: str | Scenario = "constant", num_envs: int = 1, *, autoreset: str = "next_step", **settings: Any
+        self,
+        scenario: str | Scenario = "constant",
+        num_envs: int = 1,
+        *,
+        autoreset: str | AutoresetMode = "next_step",
+        **settings: Any,
     ) -> None:
         self.num_envs = check_count("num_envs", num_envs, 1)
-        super().__init__(scenario, self.num_envs, autoreset=autoreset, **settings)
+        mode = autoreset.name.lower() if isinstance(autoreset, AutoresetMode) else autoreset
+        super().__init__(scenario, self.num_envs, autoreset=mode, **settings)
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space, self.single_action_space = self._spaces()

@@ -160,7 +160,8 @@ class Batch(OwnArrays):
         return np.asarray(self.arrays.tracker["broken_at"] == NEVER)
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Return the metrics of the current episodes by name, (E,) each."""
+        """Return the metrics of the current episodes by name, (E,) each; ResetNeeded before the first :meth:`reset`."""
+        self.check_started("metrics")
         return {each.name: each.of(self.scenario, self.arrays.world) for each in self._declared.metrics}
 
     def save(self) -> Snapshot:

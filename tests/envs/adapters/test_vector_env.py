@@ -40,7 +40,7 @@ def test_the_vector_environment_agrees_with_gymnasiums(
     name: str, settings: dict[str, Any], mode: AutoresetMode
 ) -> None:
     name = f"posse/{name}-v0"
-    ours: Any = vector(name, autoreset=mode.name.lower(), **settings)
+    ours: Any = vector(name, autoreset=mode, **settings)
     makers = [partial(gymnasium.make, name, first_world=i, **settings) for i in range(E)]
     theirs: Any = SyncVectorEnv(makers, autoreset_mode=mode)
     assert ours.autoreset_mode is ours.metadata["autoreset_mode"] is mode

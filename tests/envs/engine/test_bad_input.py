@@ -112,7 +112,7 @@ def test_seeds_of_63_bits_are_seeds(kind: str, seed: Any) -> None:
 def test_a_step_needs_an_episode(kind: str) -> None:
     subject = Subject(kind)
     good = subject.good_action(np.random.default_rng(1))
-    for call in (subject.env.state, subject.env.render):
+    for call in (subject.env.state, subject.env.render, subject.batch.metrics):
         with pytest.raises(ResetNeeded, match="before reset"):
             call()
     subject.env.reset()

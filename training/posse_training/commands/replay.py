@@ -22,7 +22,7 @@ class _Replay(Shown):
     observations: bool = True
     """Record the observations of every tracker, which are most of the file's size."""
     out: Path = Path("replay.html")
-    """File to write."""
+    """File to write; an old one is replaced."""
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -31,7 +31,7 @@ class _Watch(Shown):
     page: bool = False
     """Record the world and open its replay page (runs/watch/replay.html) in the browser, instead of a window."""
     out: Path | None = None
-    """Write a film to this file (.gif or .mp4) instead of opening a window."""
+    """Write a film to this file (.gif or .mp4; an old one is replaced) instead of opening a window."""
     size: tuple[int, int] | None = None
     """Width and height of window or film, px; default: 960 720 for a window."""
     start: Annotated[float | None, tyro.conf.arg(name="from")] = None

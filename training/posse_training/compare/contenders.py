@@ -58,7 +58,8 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
             raise PolicyError(f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,...")
         taken = {other.label for other in found}
         if label in taken or (sign and label == PLANNER):
-            raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
+            who = "the reference and another policy" if label == PLANNER else "two policies"
+            raise PolicyError(f"{who} have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
         policies = tuple(name if is_code(name) else load(name) for name in names)
         for name in filter(is_code, names):

@@ -58,6 +58,7 @@ def record(
     Raises:
         SettingsError: No policy, more than four, ``seconds`` not above 0.
         PolicyError, ScenarioError: An argument that is unknown, invalid, or does not fit the scenario.
+        PlayError: A policy that raised, or returned invalid actions.
     """
     settings = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)

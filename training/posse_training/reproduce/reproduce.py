@@ -71,7 +71,7 @@ def reproduce(out: Path = Path("runs/paper"), starts: int = 200, seed: int = 7) 
     """Repeat the experiments of the paper's section 4: figures and settling times.
 
     Args:
-        out: Folder for figures (PNG and SVG) and numbers (JSON).
+        out: Folder for figures (PNG and SVG) and numbers (JSON), which replace old ones.
         starts: Number of drawn starts; figures show the run with the median settling time.
         seed: Seed of the starts, in the test split.
     """

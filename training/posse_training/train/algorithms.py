@@ -169,8 +169,8 @@ def check_algorithm(settings: TrainSettings) -> None:
             raise SettingsError(f"encoding='plain' leaves {name} nothing to read: use features")
         if settings.advise is not None and settings.safeguard:
             raise SettingsError(
-                f"safeguard=True does not go with advise={settings.advise!r}, which has one: use the preset "
-                "residual, or --no-safeguard"
+                f"safeguard=True does not go with advise={settings.advise!r}, which has a safeguard of its own: use "
+                "--no-safeguard, as the preset residual does"
             )
         for other in ("start", "imitate", "message_size", "wandb"):
             if value := getattr(settings, other):
