@@ -170,6 +170,7 @@ MIND: Final = record(
     fix_psi=_F(0),
     target_speed=_F(0),  # estimated speed, m/s
     target_turn=_F(0),  # estimated turn rate, rad/s
+    speed_known=_I(0),  # 1: the speed has been measured
     # the target, as it is taken to be now
     target=_C(0),  # position
     target_theta=_F(0),

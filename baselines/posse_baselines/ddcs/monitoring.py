@@ -191,8 +191,9 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
         if time <= settings.turn_memory:
             me.target_turn = turned / time
             along = dot(position - me.fix, vector(1.0, me.fix_theta + 0.5 * turned)) / time
-            share = 1.0 - math.exp(-time / _SPEED_MEMORY)
+            share = 1.0 - math.exp(-time / _SPEED_MEMORY) if me.speed_known else 1.0
             me.target_speed = clip(me.target_speed + share * (along - me.target_speed), 0.0, me.max_speed)
+            me.speed_known = 1
     me.fix, me.fix_theta, me.fix_psi, me.fix_step = position, theta, psi, fix_step
 
 
