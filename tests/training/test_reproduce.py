@@ -61,6 +61,7 @@ def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
         assert "test split, seed 7<" in (tmp_path / f"{name}.svg").read_text(), "a figure says what was played"
     assert tuple(row["policy"] for row in rows) == MEMBERS
+    assert rows[MEMBERS.index("pngl-l-phi")]["settling_time_quartiles"][1] < 4.5, "s; the paper: 1.6, at another scale"
     for row in rows:
         if row["policy"] != "velocity-pursuit":  # all pursue to one point behind the target
             assert row["settled"] >= 7

@@ -2,7 +2,7 @@
 
 Fixes may be delayed and come from team-mates; each is extrapolated to the present. Position is
 noisy, heading and slot frame are not, so speed is estimated along the heading, averaged over
-seconds.
+seconds. Where commands are delayed, all is foreseen to the moment at which the next one is executed.
 """
 
 from __future__ import annotations
