@@ -130,7 +130,7 @@ def prepare(
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
     match = Match(policy if is_name else loaded, opponent, scenario, seed, split)
-    return Evaluation(loaded, match, cut(episodes, WORLDS), time_limit)
+    return Evaluation(loaded, match, cut(int(episodes), WORLDS), time_limit)
 
 
 @contextmanager
