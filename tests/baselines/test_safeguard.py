@@ -29,7 +29,7 @@ def guarded(scenario: str, **changes: Any) -> LearnedPolicy:
 @pytest.mark.parametrize("scenario", ["smart", "search", "obstacles", "radio", "field"])
 def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
     batch = posse.batch(scenario, 16, seed=3, horizon=200)
-    played = rollout(batch, guarded(scenario), ["tracker_pose"])
+    played = rollout(batch, guarded(scenario), "tracker_pose")
     assert played.metrics["score"].mean() < 0.01
     gone = np.linalg.norm(np.diff(played["tracker_pose"][..., :2], axis=0), axis=-1).sum(axis=0)
     assert np.median(gone) < 0.2, "nothing of the script's guidance moves it"
