@@ -18,7 +18,7 @@ from posse.declarations import unknown
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.policies.scripted import SCRIPTED
-from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.policy import Policy, PolicyError, check_policy
 from posse_baselines.tuned import read_tuned
 
 FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": read_tuned}
@@ -73,8 +73,8 @@ def target_names() -> tuple[str, ...]:
     return tuple(_targets())
 
 
-def load(policy: str | Path) -> Policy:
-    """Return a policy by name, from a file, or from ``"package.module:Class"``.
+def load(policy: str | Path | Policy) -> Policy:
+    """Return a policy by name, from a file, or from ``"package.module:Class"``; a policy is returned as it is.
 
     ``"package.module:Class"`` imports the module and calls the class without arguments: it **runs code**, with all
     rights of the process. Never pass on such a name from a source that you do not trust. An attribute that already is a
@@ -83,7 +83,11 @@ def load(policy: str | Path) -> Policy:
     Raises:
         PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged or of an unknown
             kind, a module or class that cannot be found or fails, or one that is no policy of a team.
+        TypeError: Something that is neither of these.
     """
+    if not isinstance(policy, str | Path):
+        check_policy(policy)
+        return policy
     text = str(policy)
     found = _found("policy", text, _teams(), FILES)
     if getattr(found, "side", "trackers") == "target":

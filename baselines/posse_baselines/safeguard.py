@@ -69,12 +69,14 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         guarded, agent, inner = _GuardedParallelEnv, env.possible_agents[0], env.unwrapped
         space, seen = env.action_space(agent), env.observation_space(agent)
         own = inner.action_space(agent), inner.observation_space(agent)
+        twice = hasattr(env, "guard")
     elif isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
         guarded, space, seen = _GuardedEnv, env.action_space, env.observation_space
         own = env.unwrapped.action_space, env.unwrapped.observation_space
+        twice = env.has_wrapper_attr("guard")
     else:
         raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
-    if env.has_wrapper_attr("guard") if isinstance(env, gymnasium.Env) else hasattr(env, "guard"):
+    if twice:
         raise PolicyError("the environment is behind the safeguard already: guard it once")
     if not isinstance(space, spaces.Box):
         raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
@@ -95,7 +97,7 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
     guard: Any = None
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        gymnasium.utils.RecordConstructorArgs.__init__(self)  # which env.spec needs
+        gymnasium.utils.RecordConstructorArgs.__init__(self)  # so that env.spec makes it again
         super().__init__(env)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:

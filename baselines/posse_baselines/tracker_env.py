@@ -10,7 +10,7 @@ import numpy as np
 from posse import Batch, PairedBatch, Scenario, ScenarioError
 from posse.adapters.gymnasium_env import TeamEnv, team_scenario
 from posse.adapters.vector_env import TeamVectorEnv
-from posse_baselines.policy import Policy, check_policy
+from posse_baselines.policy import Policy
 from posse_baselines.registry import load
 
 
@@ -22,8 +22,7 @@ class _WithTeammates:
     def __init__(
         self, *arguments: Any, number: int = 0, teammates: str | Policy = "ddcs-distributed", **settings: Any
     ) -> None:
-        self.teammates = load(teammates) if isinstance(teammates, str) else teammates
-        check_policy(self.teammates)
+        self.teammates = load(teammates)
         self.number = number
         super().__init__(*arguments, **settings)
 

@@ -72,7 +72,7 @@ def record_dataset(
     from minari.dataset.minari_storage import MinariStorage
 
     given = [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
-    players = [load(each) if isinstance(each, str) else each for each in given]
+    players = [load(each) for each in given]
     if not players:
         raise PolicyError("no policies given: pass at least one")
     if episodes < len(players):

@@ -181,7 +181,7 @@ MIND: Final = record(
     fix_age=_F(0),  # s
     known=_I(0),  # 1: there is an estimate that is not too old
     horizon=_F(0),  # distance within which every team-mate that is heard is listed, m
-    others=_I(0),  # how many do
+    others=_I(0),  # how many team-mates count as working and in range
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none

@@ -42,7 +42,7 @@ def play_shard(
 
     ``advance`` is called after each control step of a batch.
     """
-    policy = load(match.policy) if isinstance(match.policy, str) else match.policy
+    policy = load(match.policy)
     where: dict[str, Any] = {"seed": match.seed, "split": match.split}
     played = []
     for one, worlds in blocks(match.scenario, shard, **where):

@@ -18,7 +18,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
-from posse_baselines.policy import check_policy
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, describe
 from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split
@@ -60,7 +59,7 @@ def evaluate(
         **overrides: Settings of the scenario.
 
     Raises:
-        SettingsError: ``episodes`` below 1 or broken, or a split that the policy or the target was trained on.
+        SettingsError: ``episodes`` no whole number of at least 1, or a split that policy or target was trained on.
         PolicyError: An unknown policy or target, or one that does not fit; TypeError for what is none.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
         MissingExtraError: Ray is to be used and not installed.
@@ -118,8 +117,7 @@ def prepare(
     """Return an evaluation; arguments and errors are those of :func:`evaluate`, and a time limit of code, s."""
     if episodes < 1 or episodes != int(episodes):
         raise SettingsError(f"episodes={episodes} must be a whole number of at least 1")
-    loaded = load(policy) if isinstance(policy, str) else policy
-    check_policy(loaded)
+    loaded = load(policy)
     opponent = None if target is None else load_target(target)
     for player in (loaded, opponent):
         if player is not None:

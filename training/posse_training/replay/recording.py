@@ -70,7 +70,7 @@ def record(
     replays = []
     for given in policies:
         label, policy = given if isinstance(given, tuple) else ("", given)
-        loaded = load(policy) if isinstance(policy, str) else policy
+        loaded = load(policy)
         batch = batch_for(loaded, settings, 1, opponent, **place, autoreset="disabled")
         with played_errors():
             played = rollout(batch, loaded, RECORD, steps=steps)

@@ -52,7 +52,7 @@ def run_of(
     policy: str | Policy, scenario: posse.Scenario, worlds: int, seed: int, options: Mapping[str, Any] | None = None
 ) -> Trajectory:
     """Play a whole episode in ``worlds`` worlds of :data:`SPLIT`."""
-    team = load(policy) if isinstance(policy, str) else policy
+    team = load(policy)
     batch = batch_for(team, scenario, worlds, seed=seed, split=SPLIT, autoreset="disabled")
     return rollout(batch, team, _RECORD, options=options)
 
