@@ -205,6 +205,9 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
         assert state(page, "selected") == 1
         page.keyboard.press("ArrowRight")
         until(page, "location.hash === '#t=0.4&r=1'")
+        page.evaluate("location.hash = '#t=0.5'; history.replaceState(null, '', '#t=0.4&r=1')")  # as the page does
+        until(page, "window.replay.app.position === 5")
+        page.keyboard.press("ArrowLeft")
         page.evaluate("location.hash = '#t=nonsense&r=99'")
         until(page, "window.replay.app.selected === null")
         assert state(page, "position") == 4

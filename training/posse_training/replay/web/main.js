@@ -90,7 +90,8 @@ function start() {
   };
   new ResizeObserver(arrange).observe(views);
   addEventListener("resize", arrange);
-  addEventListener("hashchange", readHash);
+  // What was asked for: the address itself may have been written again since.
+  addEventListener("hashchange", ({ newURL }) => readHash(new URL(newURL).hash));
   const framed = self !== top; // by another page, which has words of its own
   document.body.classList.toggle("framed", framed);
   document.body.classList.toggle("no-panel", framed || narrow.matches);

@@ -65,8 +65,8 @@ export function begin() {
 
 // --- the address: #t=12.4&r=3 ---
 
-export function readHash() {
-  const asked = new URLSearchParams(location.hash.slice(1));
+export function readHash(hash = location.hash) {
+  const asked = new URLSearchParams(hash.slice(1));
   const time = Number(asked.get("t") ?? NaN);
   if (Number.isFinite(time)) seek(time / seconds(1));
   if (asked.has("r")) select(Number.parseInt(asked.get("r"), 10));
