@@ -43,7 +43,7 @@ def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> st
 
 _HEAD: Final = '''"""Functions that posse compiles for the declarations of a scenario."""
 
-from numpy import float32
+from numpy import float32, int64
 
 from posse.numeric import ZERO, choose, compiled, eight
 from posse.rules.senses import add_noise
@@ -124,8 +124,8 @@ class _Module:
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
             while blocks and len(columns) >= blocks[0] + WIDTH:
-                first = blocks.pop(0)
-                yield f"write_block(({', '.join(columns[first : first + WIDTH])}), {first}, rows)"
+                first = blocks.pop(0)  # as int64(), else numba would compile write_block for each
+                yield f"write_block(({', '.join(columns[first : first + WIDTH])}), int64({first}), rows)"
 
     def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:
         for k, (name, function) in enumerate(terms.items()):
