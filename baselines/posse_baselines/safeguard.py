@@ -25,7 +25,7 @@ from pettingzoo.utils import BaseParallelWrapper
 from posse import Batch, ObservationLayout
 from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
-from posse_baselines.ddcs.baseline import guard_all
+from posse_baselines.ddcs.baseline import GUARD, decide_all
 from posse_baselines.ddcs.memory import Minds
 from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
@@ -48,7 +48,7 @@ class Guard(Minds):
         actions = as_motions("the array of wanted velocities", wanted, shape, discrete=False).copy()
         if not np.isfinite(actions).all():
             raise ValueError("a wanted velocity is not a finite number")
-        self.run(guard_all, observations, actions)
+        self.run(decide_all, GUARD, observations, actions)
         return actions
 
 

@@ -1,8 +1,7 @@
 """The baseline, PNGL + l-φ: its policy, its settings and those of its family, and one control step in order.
 
-A step of one tracker is :func:`propose`, monitoring and tracking, then :func:`carry_out`, actuation. Between the two, a
-wanted velocity may be corrected: before the safeguard, so that a corrected team avoids contact as well as the team
-itself does. What ``pngl-l-phi`` does, with equation numbers of the paper:
+A step of one tracker is :func:`decide`: monitor, track, actuate. What it wants may be corrected before it actuates, so
+that the safeguard keeps a corrected team from contact, too. What ``pngl-l-phi`` does, with the paper's equations:
 
 ===============================  ======================================================  =======================
 who, when                        law                                                     where
@@ -33,15 +32,15 @@ from typing import Any, Final
 import numpy as np
 
 from posse import SENSORS, ObservationLayout, Scenario
-from posse.numeric import FloatArray, Record, Records, compiled
+from posse.numeric import FloatArray, Record, Records, compiled, kernel
 from posse_baselines.ddcs.actuation import correct, execute_safely, surround
-from posse_baselines.ddcs.memory import Minds, Team, for_each, is_due, pair, unit_of
+from posse_baselines.ddcs.memory import Minds, Team, is_due, pair, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.laws.geometry import length, scaled
-from posse_baselines.laws.steering import Work
+from posse_baselines.laws.steering import Work, work_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError
 
 BASELINE: Final = Settings(
@@ -99,9 +98,8 @@ class DDCS(BasePolicy):
         return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the actions (E, N, 2 + m) of every team: :meth:`propose`, then :meth:`carry_out`."""
-        proposals, memory = self.propose(observations, memory)
-        return self.carry_out(observations, memory, np.zeros_like(proposals))
+        """Return the actions (E, N, 2 + m) of every team: :meth:`propose` and :meth:`carry_out` in one."""
+        return self._decide(ACT, observations, memory, 0.0)
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
@@ -109,19 +107,21 @@ class DDCS(BasePolicy):
         Ahead and to the left of each tracker, as shares of its greatest speed. The first half of :meth:`act`; the
         second half, :meth:`carry_out`, follows with the same observations.
         """
-        proposals = np.zeros((*memory.me.shape, 2), np.float32)
-        memory.run(propose_all, observations, proposals)
-        return proposals, memory
+        out, memory = self._decide(PROPOSE, observations, memory, 0.0)
+        return out[..., :2].copy(), memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections, safely.
 
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows. Zeros give :meth:`act`.
         """
-        actions = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
-        actions[..., :2] = corrections
-        memory.run(carry_out_all, observations, actions)
-        return actions, memory
+        return self._decide(CARRY_OUT, observations, memory, corrections)
+
+    def _decide(self, part: int, observations: FloatArray, memory: Memory, given: Any) -> tuple[FloatArray, Memory]:
+        out = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
+        out[..., :2] = given
+        memory.run(decide_all, part, observations, out)
+        return out, memory
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).
@@ -142,9 +142,8 @@ class DDCS(BasePolicy):
 
 
 @compiled
-def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, proposal: FloatArray) -> None:
-    """Monitor and track: write the velocity that one tracker wants, ahead and left, in shares of its top speed."""
-    monitor(team, me, mates, row)
+def track(team: Team, me: Record, mates: Records, work: Work) -> None:
+    """Decide who leads, take a slot, choose the task, and set the motion that its law wants."""
     if team.settings.centralized:
         settle_lead(team, me, mates)
     if me.known == 0:
@@ -153,29 +152,50 @@ def propose(team: Team, me: Record, mates: Records, row: FloatArray, work: Work,
         choose_slot(team, me, mates, work)
     me.task = next_task(team, me, mates)
     move(team, me, mates)
-    own = me.wish * me.heading.conjugate()
-    proposal[0], proposal[1] = own.real / me.max_speed, own.imag / me.max_speed
+
+
+ACT, PROPOSE, CARRY_OUT, GUARD = range(4)
+"""Parts of a control step, of :func:`decide`."""
 
 
 @compiled
-def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
-    """Actuate: write the action (2 + m,) of one tracker, whose first two numbers are a correction of what it wants."""
-    correct(me, complex(float(action[0]), float(action[1])))
-    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
-    write_message(team, me, row, action)
+def decide(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, out: FloatArray, part: int) -> None:
+    """Do a part of a control step of one tracker; the first two numbers of ``out`` (2 + m,) are ahead and to the left.
 
-
-@compiled
-def guard(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
-    """Make a wanted velocity safe that is not the script's: it stands in the action (2 + m,), which is overwritten.
-
-    It is relative to the observed heading, and carried out from the pose at which the command is executed.
+    ============ =======================================================================================
+    ACT          the whole step: monitor, track, actuate; writes the action
+    PROPOSE      monitor and track; writes the wanted velocity, in shares of the greatest speed
+    CARRY_OUT    actuate after PROPOSE: reads a correction of the wanted velocity, writes the action
+    GUARD        monitor and actuate: reads a wanted velocity that is not the script's, relative to the
+                 observed heading, and overwrites it by speed and turn rate; the message stays
+    ============ =======================================================================================
     """
-    monitor(team, me, mates, row)
-    wanted = complex(float(action[0]), float(action[1]))
-    wanted = scaled(wanted * pair(row, team.at.heading), me.max_speed / max(1.0, length(wanted)))
-    want(me, wanted)
-    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], action)
+    given = complex(float(out[0]), float(out[1]))
+    if part != CARRY_OUT:
+        monitor(team, me, mates, row)
+    if part in (ACT, PROPOSE):
+        track(team, me, mates, work)
+    elif part == CARRY_OUT:
+        correct(me, given)
+    else:
+        want(me, scaled(given * pair(row, team.at.heading), me.max_speed / max(1.0, length(given))))
+    if part == PROPOSE:
+        own = me.wish * me.heading.conjugate()
+        out[0], out[1] = own.real / me.max_speed, own.imag / me.max_speed
+        return
+    execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], out)
+    if part != GUARD:
+        write_message(team, me, row, out)
 
 
-propose_all, carry_out_all, guard_all = for_each(propose), for_each(carry_out), for_each(guard)
+@kernel
+def decide_all(
+    minds: Any, works: Work, rows: FloatArray, out: FloatArray, part: int, thread: int, first: int, end: int
+) -> None:
+    """Call :func:`decide` for every tracker of the worlds ``first`` to ``end``."""
+    shared, me, mates = minds
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
+    work = work_of(works, thread)
+    for e in range(first, end):
+        for i in range(rows.shape[1]):
+            decide(team, me[e, i], mates[e, i], rows[e, i], work, out[e, i], part)

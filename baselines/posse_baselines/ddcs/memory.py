@@ -19,15 +19,14 @@ import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
 from posse.declarations import FIELDS
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, record_type
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, over_worlds, record_type
 from posse.rules import beam_directions
 from posse.scenarios.scenario import OPEN_PLANE_EXTENT
 from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY
-from posse_baselines.laws.steering import Work, work_for, work_of
+from posse_baselines.laws.steering import work_for
 from posse_baselines.policy import check_observations
 
-Kernel = Callable[..., None]
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
 
@@ -253,17 +252,18 @@ class Minds(OwnArrays):
                 layout.views(self._units)[field.name][...] = unit
         self.me: Records = np.full((num_worlds, robots), MIND)
         self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE)
+        self._work = work_for(layout.scenario.num_trackers)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
         self.me[mask], self.mates[mask] = MIND, MATE
 
-    def run(self, kernel: Kernel, observations: FloatArray, out: FloatArray) -> None:
-        """Run a kernel of :func:`for_each` on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
-        rows, work = check_observations(observations, self.me.shape, self.layout), work_for(self.mates.shape[2])
+    def run(self, kernel: Callable[..., None], part: int, observations: FloatArray, out: FloatArray) -> None:
+        """Do a part of a control step with a kernel, on observations (E, R, F); it writes to ``out`` (E, R, ...)."""
+        rows = check_observations(observations, self.me.shape, self.layout)
         if unit_of(self.layout.scenario) != 1.0:
             rows = rows / self._units
-        over_worlds(kernel, ((self.team, self.me, self.mates), work, rows, out), *self.me.shape)
+        over_worlds(kernel, ((self.team, self.me, self.mates), self._work, rows, out, part), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
@@ -271,21 +271,6 @@ class Minds(OwnArrays):
         for name, records in (("me", self.me), ("mates", self.mates)):
             arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
         return arrays
-
-
-def for_each(function: Kernel) -> Kernel:
-    """Return a kernel that calls ``function(team, me, mates, row, work, out)`` for every tracker."""
-
-    @kernel
-    def run(minds: Any, works: Work, rows: FloatArray, out: FloatArray, thread: int, first: int, end: int) -> None:
-        shared, me, mates = minds
-        team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
-        work = work_of(works, thread)
-        for e in range(first, end):
-            for i in range(rows.shape[1]):
-                function(team, me[e, i], mates[e, i], rows[e, i], work, out[e, i])
-
-    return run
 
 
 @compiled

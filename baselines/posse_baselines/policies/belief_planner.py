@@ -292,6 +292,11 @@ class BeliefPlanner(DDCS):
         super().begin(layout, num_worlds)
         return Beliefs(layout, self.settings_for(layout.scenario), num_worlds, self.plans)
 
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return the actions (E, N, 2 + m) of every team: :meth:`propose`, then :meth:`carry_out`."""
+        proposals, memory = self.propose(observations, memory)
+        return self.carry_out(observations, memory, np.zeros_like(proposals))
+
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard; see :meth:`DDCS.propose`."""
         proposals, memory = super().propose(observations, memory)
