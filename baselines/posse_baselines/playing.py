@@ -138,13 +138,14 @@ class Recorder:
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
-        self._lengths += ~self.over
-        ended = ~self.over & (terminated | truncated)
+        ended = terminated | truncated
         if ended.any():
+            first = ended & ~self.over
             for name in self.batch.metrics():
-                column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
-                column[ended] = infos[f"metrics/{name}"][ended]
-            self.over |= ended
+                column = self._metrics.setdefault(name, np.full(len(first), np.nan))
+                column[first] = infos[f"metrics/{name}"][first]
+            self._lengths[first] = self.steps
+            self.over |= first
         if not self._names:
             return done
         terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
@@ -182,7 +183,8 @@ class Recorder:
         for name, values in self._metrics.items():
             now[name][self.over] = values[self.over]
         arrays = {name: np.stack(rows) for name, rows in self._rows.items()}
-        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, self._lengths.copy(), now)
+        lengths = np.where(self.over, self._lengths, self.steps)
+        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, lengths, now)
 
 
 def poses_of(state: Mapping[str, Array], who: str) -> Array:
@@ -249,15 +251,17 @@ def rollout(
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
     recorder = Recorder(_moving(batch), record)
     memory = begin(policy, batch)
-    observations = recorder.reset(seed=seed, options=options)
+    observations, any_ended = recorder.reset(seed=seed, options=options), False
     while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
         actions, memory = policy.act(observations, memory)
         annotations = policy.annotations(memory) if "annotations" in record else None
         observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
-        ended = terminated | truncated
-        begins = batch.arrays.world["step"] == 0
-        if begins.any():
-            memory = policy.restart(memory, begins)
+        ended, before = terminated | truncated, any_ended
+        any_ended = bool(ended.any())
+        if any_ended or before:  # episodes begin in the step in which others end, or in the next
+            begins = batch.arrays.world["step"] == 0
+            if begins.any():
+                memory = policy.restart(memory, begins)
         if after_step is not None:
             after_step(memory)
         if batch.autoreset == "disabled" and ended.any() and not ended.all():
