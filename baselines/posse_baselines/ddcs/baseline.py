@@ -189,11 +189,9 @@ def decide(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, 
 
 
 @kernel
-def decide_all(
-    minds: Any, works: Work, rows: FloatArray, out: FloatArray, part: int, thread: int, first: int, end: int
-) -> None:
+def decide_all(minds: Any, works: Work, arrays: Any, part: int, thread: int, first: int, end: int) -> None:
     """Call :func:`decide` for every tracker of the worlds ``first`` to ``end``."""
-    shared, me, mates = minds
+    (shared, me, mates), (rows, out) = minds, arrays
     team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.beams)
     work = work_of(works, thread)
     for e in range(first, end):
