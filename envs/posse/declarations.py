@@ -504,3 +504,8 @@ class Declarations(NamedTuple):
             METRICS.of(*scenario.metrics),
             REWARD_TERMS.of(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
         )
+
+    def modules(self) -> list[str]:
+        """Return the names of the users' modules that made them, which another process has to import."""
+        own = (each for group in self for each in group if not each.built_in)
+        return sorted({str(plain(each.function).__module__) for each in own} - {"__main__"})

@@ -38,6 +38,7 @@ def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -
 
 
 INVALID = {
+    "--import nosuch scenarios": "posse: --import nosuch: ModuleNotFoundError",
     "comprae": "unknown command 'comprae': did you mean 'compare'?",
     "watch pursuit --world -1": "world=-1",
     "watch": "No policies given",

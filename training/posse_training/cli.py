@@ -9,6 +9,7 @@ import difflib
 import importlib
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from posse_training.errors import UserError
@@ -48,6 +49,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     correct; 130: interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if (here := str(Path.cwd())) not in sys.path:  # modules of the user's own
+        sys.path.append(here)
+    while given[:1] == ["--import"]:
+        module, given = "".join(given[1:2]), given[2:]
+        try:
+            importlib.import_module(module)
+        except Exception as error:  # whatever the module raises
+            print(f"posse: --import {module}: {type(error).__name__}: {error}", file=sys.stderr)
+            return 2
     if not given or given[0] in ("-h", "--help"):
         print(_usage())
         return 0
@@ -84,9 +94,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _usage() -> str:
-    lines = ["usage: posse COMMAND ...", ""]
+    lines = ["usage: posse [--import MODULE] COMMAND ...", ""]
     for group, commands in GROUPS.items():
         lines += [f"{group}:", *(f"  {name:<11} {summary}" for name, (summary, _) in commands.items()), ""]
+    lines += ["--import MODULE: first import a module with declarations of your own, from this folder, too"]
     return "\n".join([*lines, "posse COMMAND --help lists its arguments"])
 
 

@@ -9,15 +9,17 @@ frame follows the target's heading at a limited rate, so that a robot that does 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import importlib
 import math
 import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, undeclared, unknown
+from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, Declarations, undeclared, unknown
 from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
@@ -224,6 +226,9 @@ class Scenario:
             for name, why in conflicts(self):
                 fail(name, getattr(self, name), why)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (Declarations.of(self).modules(), self.__dict__.copy())
+
     @staticmethod
     @functools.cache
     def settings() -> Mapping[str, Setting]:
@@ -389,6 +394,14 @@ class Scenario:
         values["reward_weights"] = dict(self.reward_weights)
         values["target_reward_weights"] = dict(self.target_reward_weights)
         return values
+
+
+def _unpickled(modules: list[str], settings: dict[str, Any]) -> Scenario:
+    """Return a pickled scenario; the modules of a user's declarations are imported, where they are to be found."""
+    for module in modules:
+        with contextlib.suppress(ModuleNotFoundError):  # what it lacks then, the scenario says
+            importlib.import_module(module)
+    return Scenario(**settings)
 
 
 _Conflicts = Iterator[tuple[str, str]]
