@@ -185,7 +185,7 @@ class Registry(dict[str, D]):
 
 def undeclared(kind: str, name: object, known: Iterable[str]) -> str:
     """Return the message for a name that is not declared."""
-    return f"{unknown(kind, name, known)}. To use a declaration of your own, import its module first"
+    return f"{unknown(kind, name, known)}. To use one of your own, import its module first (commands: --import MODULE)"
 
 
 def _home(function: Function) -> tuple[str, str]:

@@ -156,7 +156,7 @@ read = "import pickle, sys; print(pickle.load(sys.stdin.buffer).extra_fields)"
 subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check=True)"""
     assert run(tmp_path, code, **EXAMPLES).stdout == "('wall_distance',)\n"
     code = """from posse_training.cli import main
-main("--import walls scenarios obstacles".split())
+main("scenarios obstacles --import walls".split())
 import posse
 assert posse.get_scenario("obstacles", extra_fields=["wall_distance"])"""
     assert run(tmp_path, code).returncode == 0

@@ -13,9 +13,9 @@ from posse_training.train.settings import read_settings
 
 
 def test_settings_are_read_and_written_alike() -> None:
-    words = ["arena=6,4", "target_speed=0.5", "horizon=40", "terminate_on_contact=True", "target_motion=smart"]
+    words = ["arena=6,4", "target_speed=0.5", "horizon=40", "terminate_on_contact=True", "extra_fields=own,"]
     values = {"arena": (6, 4), "target_speed": 0.5, "horizon": 40, "terminate_on_contact": True}
-    assert settings_of(words) == {**values, "target_motion": "smart"}
+    assert settings_of(words) == {**values, "extra_fields": ("own",)}
     assert words_of(settings_of(words)) == words
     wanted = {"num_neighbours": None, "sensing_range": float("inf")}
     assert settings_of(["num_neighbours=none", "sensing_range=inf"]) == wanted

@@ -51,8 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     if (here := str(Path.cwd())) not in sys.path:  # modules of the user's own
         sys.path.append(here)
-    while given[:1] == ["--import"]:
-        module, given = "".join(given[1:2]), given[2:]
+    while "--import" in given:
+        at = given.index("--import")
+        module, given = "".join(given[at + 1 : at + 2]), given[:at] + given[at + 2 :]
         try:
             importlib.import_module(module)
         except Exception as error:  # whatever the module raises
@@ -94,10 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _usage() -> str:
-    lines = ["usage: posse [--import MODULE] COMMAND ...", ""]
+    lines = ["usage: posse COMMAND ... [--import MODULE]", ""]
     for group, commands in GROUPS.items():
         lines += [f"{group}:", *(f"  {name:<11} {summary}" for name, (summary, _) in commands.items()), ""]
-    lines += ["--import MODULE: first import a module with declarations of your own, from this folder, too"]
+    lines += ["--import MODULE first imports a module of your own declarations, from this folder too"]
     return "\n".join([*lines, "posse COMMAND --help lists its arguments"])
 
 

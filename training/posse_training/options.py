@@ -50,10 +50,9 @@ def settings_of(words: Sequence[str]) -> dict[str, Any]:
 
 def words_of(settings: Mapping[str, Any]) -> list[str]:
     """Return the words that stand for settings, as :func:`settings_of` reads them."""
-    return [
-        f"{name}={','.join(map(str, value)) if isinstance(value, (tuple, list)) else value}"
-        for name, value in settings.items()
-    ]
+    lists = {name: value for name, value in settings.items() if isinstance(value, (tuple, list))}
+    texts = {name: ",".join(map(str, value)) + "," * (len(value) == 1) for name, value in lists.items()}
+    return [f"{name}={value}" for name, value in {**settings, **texts}.items()]
 
 
 def _words(
