@@ -149,17 +149,13 @@ EXAMPLES = examples("extend.md")
 
 
 def test_another_process_and_a_command_import_a_users_module(tmp_path: Path) -> None:
-    code = """import pickle, subprocess, sys
-import posse, walls
+    code = """import pickle, posse, subprocess, sys
+from posse_training.cli import main
+main("scenarios obstacles --import walls".split())
 scenario = posse.get_scenario("obstacles", extra_fields=["wall_distance"])
 read = "import pickle, sys; print(pickle.load(sys.stdin.buffer).extra_fields)"
 subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check=True)"""
-    assert run(tmp_path, code, **EXAMPLES).stdout == "('wall_distance',)\n"
-    code = """from posse_training.cli import main
-main("scenarios obstacles --import walls".split())
-import posse
-assert posse.get_scenario("obstacles", extra_fields=["wall_distance"])"""
-    assert run(tmp_path, code).returncode == 0
+    assert "('wall_distance',)" in run(tmp_path, code, **EXAMPLES).stdout
 
 
 FIELDS_AND_TERMS = """

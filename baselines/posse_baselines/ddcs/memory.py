@@ -263,7 +263,9 @@ class Minds(OwnArrays):
         rows = check_observations(observations, self.me.shape, self.layout)
         if unit_of(self.layout.scenario) != 1.0:
             rows = rows / self._units
-        over_worlds(kernel, ((self.team, self.me, self.mates), self._work, (rows, out), part), *self.me.shape)
+        arguments, (worlds, robots) = ((self.team, self.me, self.mates), self._work, (rows, out), part), self.me.shape
+        # No more threads than it has work memory for: once unpickled, that is of another machine.
+        over_worlds(kernel, arguments, worlds, robots, len(self._work.cost))
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""

@@ -170,7 +170,8 @@ class Encoder(OwnArrays):
         if (count := self.encoding.num_features) > 0:
             features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
             # The threads share out rows as if each were a world of one tracker.
-            over_worlds(_write_all, (rows, self._for_features, estimates.reshape(-1), features), len(rows), 1)
+            arguments, threads = (rows, self._for_features, estimates.reshape(-1), features), len(self._for_features[1])
+            over_worlds(_write_all, arguments, len(rows), 1, threads)
             self.estimates[worlds] = estimates
             out[:, :count] = features.view(np.float32).reshape(len(rows), count)
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0

@@ -59,7 +59,8 @@ class Teams(NamedTuple):
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
     """Write actions (E, rows, 2 + m) for the trackers of those worlds that are ``going`` (E,)."""
-    over_worlds(drive_all, (teams, batch.arrays, going, actions), batch.num_worlds, batch.scenario.num_trackers)
+    threads, robots = len(teams.work.cost), batch.scenario.num_trackers
+    over_worlds(drive_all, (teams, batch.arrays, going, actions), batch.num_worlds, robots, threads)
 
 
 @compiled

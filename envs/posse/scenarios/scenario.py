@@ -227,6 +227,7 @@ class Scenario:
                 fail(name, getattr(self, name), why)
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the settings, and which modules of a user's they need."""
         return _unpickled, (Declarations.of(self).modules(), self.__dict__.copy())
 
     @staticmethod
