@@ -6,7 +6,7 @@ from hypothesis import settings
 
 # Small networks do not gain from torch's threads, which wait for each other by spinning.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# With colorama, numba prepares the colours of messages that it never shows: a tenth of the time to compile a kernel.
+# With colorama, numba prepares the colours of messages that it never shows: some percent of the time to compile.
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 # Windows of tests need no screen.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
