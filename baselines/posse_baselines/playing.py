@@ -251,17 +251,15 @@ def rollout(
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
     recorder = Recorder(_moving(batch), record)
     memory = begin(policy, batch)
-    observations, any_ended = recorder.reset(seed=seed, options=options), False
+    observations = recorder.reset(seed=seed, options=options)
     while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
         actions, memory = policy.act(observations, memory)
         annotations = policy.annotations(memory) if "annotations" in record else None
         observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
-        ended, before = terminated | truncated, any_ended
-        any_ended = bool(ended.any())
-        if any_ended or before:  # episodes begin in the step in which others end, or in the next
-            begins = batch.arrays.world["step"] == 0
-            if begins.any():
-                memory = policy.restart(memory, begins)
+        ended = terminated | truncated
+        begins = batch.arrays.world["step"] == 0
+        if begins.any():
+            memory = policy.restart(memory, begins)
         if after_step is not None:
             after_step(memory)
         if batch.autoreset == "disabled" and ended.any() and not ended.all():

@@ -505,7 +505,12 @@ class Declarations(NamedTuple):
             REWARD_TERMS.of(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights)),
         )
 
+    @property
+    def added(self) -> tuple[Declaration, ...]:
+        """Those of users' modules."""
+        return tuple(each for group in self for each in group if not each.built_in)
+
+    @property
     def modules(self) -> list[str]:
-        """Return the names of the users' modules that made them, which another process has to import."""
-        own = (each for group in self for each in group if not each.built_in)
-        return sorted({str(plain(each.function).__module__) for each in own} - {"__main__"})
+        """Names of these modules, which another process has to import."""
+        return sorted({str(plain(each.function).__module__) for each in self.added} - {"__main__"})

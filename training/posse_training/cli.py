@@ -9,7 +9,6 @@ import difflib
 import importlib
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 from posse_training.errors import UserError
@@ -49,15 +48,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     correct; 130: interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
-    if (here := str(Path.cwd())) not in sys.path:  # modules of the user's own
-        sys.path.append(here)
+    if "" not in sys.path:  # the current folder, for modules of the user's own
+        sys.path.append("")
     while "--import" in given:
         at = given.index("--import")
         module, given = "".join(given[at + 1 : at + 2]), given[:at] + given[at + 2 :]
         try:
             importlib.import_module(module)
         except Exception as error:  # whatever the module raises
-            print(f"posse: --import {module}: {type(error).__name__}: {error}", file=sys.stderr)
+            why = f"{type(error).__name__}: {error}; name a module that is installed, or in this folder"
+            print(f"posse: --import {module}: {why}", file=sys.stderr)
             return 2
     if not given or given[0] in ("-h", "--help"):
         print(_usage())

@@ -118,7 +118,7 @@ class DDCS(BasePolicy):
         return self._decide(CARRY_OUT, observations, memory, corrections)
 
     def _decide(self, part: int, observations: FloatArray, memory: Memory, given: Any) -> tuple[FloatArray, Memory]:
-        """Do a part of a control step, given the first two numbers of ``out`` of :func:`decide`, (E, N, 2)."""
+        """Do a part of a control step (:func:`decide`), which reads ``given`` (E, N, 2); return what it writes."""
         out = np.zeros((*memory.me.shape, 2 + memory.layout.scenario.message_size), np.float32)
         out[..., :2] = given
         memory.run(decide_all, part, observations, out)

@@ -264,7 +264,7 @@ class Minds(OwnArrays):
         if unit_of(self.layout.scenario) != 1.0:
             rows = rows / self._units
         arguments, (worlds, robots) = ((self.team, self.me, self.mates), self._work, (rows, out), part), self.me.shape
-        # No more threads than it has work memory for: once unpickled, that is of another machine.
+        # An unpickled memory may have work arrays for fewer threads than this machine runs.
         over_worlds(kernel, arguments, worlds, robots, len(self._work.cost))
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:

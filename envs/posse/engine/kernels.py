@@ -202,7 +202,7 @@ def kernel_of(declarations: Declarations) -> Callable[..., int]:
     number of those whose episodes are over. It is compiled again when a value that a user's function reaches has
     changed.
     """
-    added = (function for group in declarations for each in group if not each.built_in for function in each.functions)
+    added = (function for each in declarations.added for function in each.functions)
     return _kernel_of(declarations, stamp(*added))
 
 

@@ -9,7 +9,6 @@ frame follows the target's heading at a limited rate, so that a robot that does 
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import importlib
@@ -228,7 +227,7 @@ class Scenario:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings, and which modules of a user's they need."""
-        return _unpickled, (Declarations.of(self).modules(), self.__dict__.copy())
+        return _unpickled, (Declarations.of(self).modules, self.__dict__.copy())
 
     @staticmethod
     @functools.cache
@@ -398,11 +397,14 @@ class Scenario:
 
 
 def _unpickled(modules: list[str], settings: dict[str, Any]) -> Scenario:
-    """Return a pickled scenario; the modules of a user's declarations are imported, where they are to be found."""
+    """Return a pickled scenario, and import the modules that its declarations come from."""
     for module in modules:
-        with contextlib.suppress(ModuleNotFoundError):  # what it lacks then, the scenario says
+        try:
             importlib.import_module(module)
-    return Scenario(**settings)
+        except ModuleNotFoundError as error:
+            if error.name != module:  # it is there, and lacks something itself
+                raise
+    return Scenario(**settings)  # which says what is not declared
 
 
 _Conflicts = Iterator[tuple[str, str]]

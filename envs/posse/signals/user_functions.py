@@ -21,8 +21,7 @@ _typeof: Final[Any] = numba.typeof
 
 def check_functions(declarations: Declarations) -> None:
     """Raise DeclarationError for a user's function that cannot be compiled. Takes some tenths of a second for each."""
-    added = [each for group in declarations for each in group if not each.built_in]
-    if UNCOMPILED or not added:
+    if UNCOMPILED or not declarations.added:
         return
     records = {"c": CONFIG, "w": world_record(declarations), "t": TRACKER, "s": SCRATCH}
     arrays = {"trackers": TRACKER, "obstacles": OBSTACLE, "slots": SLOT}
@@ -35,7 +34,7 @@ def check_functions(declarations: Declarations) -> None:
         "dx": types.float32,
         "dy": types.float32,
     }
-    for declaration in added:
+    for declaration in declarations.added:
         for function, returns in declaration.functions.items():
             reason = _why_not(function, tuple(known[name] for name in parameters_of(function)), returns)
             if reason:

@@ -124,7 +124,7 @@ def _what_next(path: Path) -> str:
         target = f" --target {opponents[-1]}"
     changed = f" --set {shlex.join(words_of(run.overrides))}" if run.overrides else ""
     played = scenario_or_family(scenario).replace(**run.overrides)
-    modules = Declarations.of(getattr(played, "base", played)).modules()
+    modules = Declarations.of(getattr(played, "base", played)).modules
     where = f"--scenario {scenario}{target}{changed}{''.join(f' --import {module}' for module in modules)}"
     lines = [f"watch {watched} {where}", f"compare {teams} {where}", f"replay {teams} {where} --out {page}"]
     shown = lines[1:2] if scenario in family_names() else lines  # watch and replay show one scenario

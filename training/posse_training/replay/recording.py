@@ -92,7 +92,7 @@ def _options(scenario: Scenario, observations: bool, **played: object) -> list[s
         if value is not None:
             words += [f"--{name}", f"{value:.10g}" if isinstance(value, float) else str(value)]
     words += [] if observations else ["--no-observations"]
-    words += [word for module in Declarations.of(scenario).modules() for word in ("--import", module)]
+    words += [word for module in Declarations.of(scenario).modules for word in ("--import", module)]
     return [*words, "--set", *settings] if settings else words
 
 
