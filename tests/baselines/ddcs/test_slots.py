@@ -23,7 +23,7 @@ from posse_baselines.policy import Memory
         (40, {"radio_loss": 0.3, "radio_delay": 2}),
         (40, {"num_trackers": 8, "formation": "ring", "num_neighbours": 3}),
         # Team-mates that are no longer in the observation must not stay as obstacles where they were.
-        (10, {"num_trackers": 40, "num_neighbours": 8, "formation": "rows"}),
+        (4, {"num_trackers": 40, "num_neighbours": 8, "formation": "rows"}),
     ],
 )
 def test_trackers_end_in_slots_of_their_own(worlds: int, settings: dict[str, Any]) -> None:
