@@ -5,6 +5,7 @@ Each command is imported when it is called: listing the scenarios does not impor
 
 from __future__ import annotations
 
+import argparse
 import difflib
 import importlib
 import sys
@@ -47,12 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: success; 1: part of the work failed, as the output says; 2: an error that the user can
     correct; 130: interrupted.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    parser = argparse.ArgumentParser("posse", "posse COMMAND ... [--import MODULE]", add_help=False, allow_abbrev=False)
+    parser.add_argument("--import", dest="modules", action="append", default=[])
+    known, given = parser.parse_known_args(arguments)
     if "" not in sys.path:  # the current folder, for modules of the user's own
         sys.path.append("")
-    while "--import" in given:
-        at = given.index("--import")
-        module, given = "".join(given[at + 1 : at + 2]), given[:at] + given[at + 2 :]
+    for module in known.modules:
         try:
             importlib.import_module(module)
         except Exception as error:  # whatever the module raises
