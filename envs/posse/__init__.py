@@ -12,10 +12,6 @@ from posse.declarations import (
     TARGET_MOTIONS,
     DeclarationError,
     Field,
-    Metric,
-    RewardTerm,
-    Sensor,
-    TargetMotion,
     field,
     metric,
     reward_term,
@@ -30,9 +26,9 @@ from posse.signals.layout import ObservationLayout
 
 __version__ = "0.1.0"
 
-METRICS: Final[tuple[Metric, ...]] = declarations.METRICS.of()
+METRICS: Final[tuple[metric, ...]] = declarations.METRICS.of()
 """Every built-in metric, in the order in which they are reported."""
-REWARD_TERMS: Final[tuple[RewardTerm, ...]] = declarations.REWARD_TERMS.of()
+REWARD_TERMS: Final[tuple[reward_term, ...]] = declarations.REWARD_TERMS.of()
 """The built-in reward terms, in the order in which they are reported."""
 
 
@@ -52,17 +48,13 @@ __all__ = [
     "Family",
     "Field",
     "Heard",
-    "Metric",
     "ObservationLayout",
     "PairedBatch",
-    "RewardTerm",
     "Robot",
     "Scenario",
     "ScenarioError",
-    "Sensor",
     "Snapshot",
     "TargetFix",
-    "TargetMotion",
     "TargetPolicy",
     "batch",
     "batches",

@@ -10,6 +10,7 @@ The functions take records: ``c`` the scenario (:data:`posse.rules.state.CONFIG`
 
 from __future__ import annotations
 
+import copy
 import difflib
 import functools
 import inspect
@@ -18,7 +19,7 @@ import math
 import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from types import FunctionType
 from typing import Any, ClassVar, Final, NamedTuple, TypeVar
 
@@ -30,7 +31,6 @@ from posse.numeric import Records, compiled
 Function = Callable[..., Any]
 Bound = float | Callable[[Any], float]
 """A number, or a function of the scenario that returns one."""
-Decorator = Callable[[Function], Function]
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> str:
@@ -69,32 +69,70 @@ def is_number(value: object) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+D = TypeVar("D", bound="Declaration")
+
+
+class Registry(dict[str, D]):
+    """Declarations of one kind by name, in order."""
+
+    def of(self, *names: str) -> tuple[D, ...]:
+        """Return the built-in declarations, in order, then the named ones, each once; KeyError for an unknown name."""
+        built_in = [each for each in self.values() if each.built_in]
+        return tuple(dict.fromkeys((*built_in, *(self[name] for name in names))))
+
+
+def undeclared(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the message for a name that is not declared."""
+    return f"{unknown(kind, name, known)}. To use one of your own, import its module first (commands: --import MODULE)"
+
+
 class Declaration:
-    """A declared function.
+    """A decorator that declares a function, and what it declares.
 
     Attributes:
-        name: Its name.
+        name: Its name; default: that of the function.
         unit: Unit of its value; "-" for rules, which have none.
         function: The function, compiled if kernels call it.
         kind: Name of the kind for messages, such as ``"reward term"``.
+        known: All of this kind.
         signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
             All but ``function`` may be ``None``.
         choices: The values that other attributes may have.
     """
 
     name: str
-    unit: str = "-"
+    unit: str
     function: Function
     kind: ClassVar[str]
+    known: ClassVar[Registry[Any]]
     signatures: ClassVar[Mapping[str, tuple[str, str]]]
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
+        if callable(first := next(iter(vars(self).values()))):
+            reason = 'the decorator needs arguments: a unit, such as "1", or a name'
+            raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
+
+    def __call__(self, function: Function) -> Function:
+        """Declare a function, and return it, compiled if kernels call it.
+
+        A declaration replaces one that was made on a function of the same module and qualified name.
+        """
+        made = copy.copy(self)
+        made.function, made.name = function, getattr(self, "name", getattr(plain(function), "__name__", ""))
+        made._check()
+        taken = self.known.setdefault(made.name, made)
+        if _home(taken.function) != _home(function):
+            raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
+        self.known[made.name] = made
+        return made.function
+
+    def _check(self) -> None:
+        """Raise DeclarationError for an invalid declaration."""
         for attribute, (allowed, _) in self.signatures.items():
             function = getattr(self, attribute)
             if attribute == "function" or function is not None:
-                object.__setattr__(self, attribute, self._checked(function, allowed))
+                setattr(self, attribute, self._checked(function, allowed))
         name: Any = self.name
         unit: Any = self.unit
         if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
@@ -140,57 +178,15 @@ class Declaration:
         return DeclarationError(f"{self.kind} {place_of(function or self.function)}: {reason}")
 
 
-D = TypeVar("D", bound=Declaration)
-
-
-class Registry(dict[str, D]):
-    """Declarations of one kind by name, in order."""
-
-    def __init__(self, make: type[D]) -> None:
-        super().__init__()
-        self.make = make
-        self.kind = make.kind
-
-    def decorator(self, **options: Any) -> Decorator:
-        """Return the decorator that declares a function, and returns it, compiled if kernels call it.
-
-        A declaration replaces one that was made on a function of the same module and qualified name.
-
-        Args:
-            **options: Attributes of the declaration; its name is by default that of the function.
-        """
-        first = next(iter(options.values()))
-        if callable(first):
-            reason = 'the decorator needs arguments: a unit, such as "1", or a name'
-            raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
-
-        def declare(function: Function) -> Function:
-            made = self.make(function=function, **{"name": getattr(plain(function), "__name__", ""), **options})
-            taken = self.get(made.name)
-            if taken is not None and _home(taken.function) != _home(function):
-                raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
-            self[made.name] = made
-            return made.function
-
-        return declare
-
-    def of(self, *names: str) -> tuple[D, ...]:
-        """Return the built-in declarations, in order, then the named ones, each once; KeyError for an unknown name."""
-        built_in = [each for each in self.values() if each.built_in]
-        return tuple(dict.fromkeys((*built_in, *(self[name] for name in names))))
-
-    def __missing__(self, name: str) -> D:
-        raise KeyError(undeclared(self.kind, name, self))
-
-
-def undeclared(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the message for a name that is not declared."""
-    return f"{unknown(kind, name, known)}. To use one of your own, import its module first (commands: --import MODULE)"
-
-
 def _home(function: Function) -> tuple[str, str]:
     return plain(function).__module__, plain(function).__qualname__
 
+
+FIELDS: Final[Registry[field]] = Registry()
+METRICS: Final[Registry[metric]] = Registry()
+REWARD_TERMS: Final[Registry[reward_term]] = Registry()
+SENSORS: Final[Registry[sensor]] = Registry()
+TARGET_MOTIONS: Final[Registry[target_motion]] = Registry()
 
 MOST_NUMBERS: Final = 256
 """Most values of one field."""
@@ -212,22 +208,44 @@ class Field:
     """Whether it is repeated for each place of a team-mate."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FieldDeclaration(Declaration):
-    """A field of any scenario, and the function that computes it."""
+@dataclass(eq=False)
+class field(Declaration):  # noqa: N801 (used as a function is)
+    """Declare a function as an observation field of its name; its docstring is the meaning.
+
+    The parameters of the function determine the field's subject:
+
+    ========== ===================================================================================
+    (c)        a setting of the scenario, a constant
+    (c, v)     the robot itself or its knowledge of the target (:class:`posse.signals.views.View`)
+    (c, v, m)  a team-mate (:class:`posse.signals.views.Mate`), for each of them
+    ========== ===================================================================================
+
+    ``v`` and ``m`` hold eight observers, so a formula is written for a block of eight numbers like for one
+    (:mod:`posse.numeric`). The function returns a number, or a tuple of ``size`` of them.
+
+    Args:
+        unit: Its unit; ``"1"`` for a plain number.
+        low: The least value, or a function (scenario) -> least value.
+        high: The greatest, likewise.
+        unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
+        size: Number of values that the function returns, at most 256; as a tuple if more than one.
+        when: A function (scenario) -> whether its observation has the field; default: always.
+    """
 
     kind = "observation field"
+    known: ClassVar = FIELDS
     signatures: ClassVar = {"function": ("(c) or (c, v) or (c, v, m)", "numbers")}
 
-    size: int
+    unit: str
     low: Bound
     high: Bound
-    unknown: float | None
+    unknown: float | None = None
+    _: KW_ONLY
+    size: int = 1
     when: Callable[[Any], bool] | None = None
 
-    def __post_init__(self) -> None:
-        """Raise DeclarationError also if the size is invalid, or the name is one of posse's own."""
-        super().__post_init__()
+    def _check(self) -> None:
+        super()._check()
         if self.name in ("sonar", "neighbour_message"):  # whose size depends on the scenario: they are not declared
             raise self.error(f"the name {self.name!r} is taken by posse")
         if type(self.size) is not int or not 1 <= self.size <= MOST_NUMBERS:
@@ -266,55 +284,8 @@ class FieldDeclaration(Declaration):
         return float(value)
 
 
-def field(
-    unit: str,
-    low: Bound,
-    high: Bound,
-    unknown: float | None = None,
-    *,
-    size: int = 1,
-    when: Callable[[Any], bool] | None = None,
-) -> Decorator:
-    """Declare a function as an observation field of its name; its docstring is the meaning.
-
-    The parameters of the function determine the field's subject:
-
-    ========== ===================================================================================
-    (c)        a setting of the scenario, a constant
-    (c, v)     the robot itself or its knowledge of the target (:class:`posse.signals.views.View`)
-    (c, v, m)  a team-mate (:class:`posse.signals.views.Mate`), for each of them
-    ========== ===================================================================================
-
-    ``v`` and ``m`` hold eight observers, so a formula is written for a block of eight numbers like for one
-    (:mod:`posse.numeric`). The function returns a number, or a tuple of ``size`` of them.
-
-    Args:
-        unit: Its unit; ``"1"`` for a plain number.
-        low: The least value, or a function (scenario) -> least value.
-        high: The greatest, likewise.
-        unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
-        size: Number of values that the function returns, at most 256; as a tuple if more than one.
-        when: A function (scenario) -> whether its observation has the field; default: always.
-    """
-    return FIELDS.decorator(unit=unit, low=low, high=high, unknown=unknown, size=size, when=when)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RewardTerm(Declaration):
-    """One term of the reward; :func:`reward_term` describes the attributes."""
-
-    kind = "reward term"
-    signatures: ClassVar = {"function": ("(c, w, t) or (c, w)", "a number"), "target": ("(c, w)", "a number")}
-
-    target: Function | None
-
-    @property
-    def of_target(self) -> Function | None:
-        """The function for a target that is an agent; ``None``: it has none."""
-        return self.function if self.target is None and "t" not in parameters_of(self.function) else self.target
-
-
-def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
+@dataclass(eq=False)
+class reward_term(Declaration):  # noqa: N801
     """Declare a function as a reward term with its name; its docstring is the meaning.
 
     The function takes ``(c, w, t)``: the records of the scenario, the world and a tracker
@@ -326,17 +297,51 @@ def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
         target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
             ``(c, w, t)`` is for trackers only.
     """
-    return REWARD_TERMS.decorator(unit=unit, target=target)
+
+    kind = "reward term"
+    known: ClassVar = REWARD_TERMS
+    signatures: ClassVar = {"function": ("(c, w, t) or (c, w)", "a number"), "target": ("(c, w)", "a number")}
+
+    unit: str
+    _: KW_ONLY
+    target: Function | None = None
+
+    @property
+    def of_target(self) -> Function | None:
+        """The function for a target that is an agent; ``None``: it has none."""
+        return self.function if self.target is None and "t" not in parameters_of(self.function) else self.target
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Metric(Declaration):
-    """One metric of an episode; :func:`metric` describes the attributes."""
+@dataclass(eq=False)
+class metric(Declaration):  # noqa: N801
+    """Declare a function as a metric of an episode with its name; its docstring is the meaning.
+
+    The metric is the mean of its values in an episode, from their sum, the field ``<name>_sum`` of the world's record.
+    The parameters of the function determine of what:
+
+    ========================= ========================================================================
+    (c, w)                    a value of the world, in each control step
+    (c, w, t)                 a value of each working tracker, in each control step
+    (c, w, trackers)          a value of the team, in each control step
+    (c, w, trackers, slots)   the same, with the slots
+    (s, w)                    nothing: called from Python with the scenario and the records of all
+                              worlds, it returns the metric of each, (E,)
+    ========================= ========================================================================
+
+    ``info`` reports the built-in metrics at the end of every episode, and others if the scenario names
+    them. ``nan`` stands for "never happened".
+
+    Args:
+        unit: Unit of the metric.
+    """
 
     kind = "metric"
+    known: ClassVar = METRICS
     signatures: ClassVar = {
         "function": ("(c, w) or (c, w, t) or (c, w, trackers) or (c, w, trackers, slots) or (s, w)", "a number")
     }
+
+    unit: str
 
     @property
     def summed(self) -> bool:
@@ -360,63 +365,8 @@ class Metric(Declaration):
         return mean
 
 
-def metric(unit: str) -> Decorator:
-    """Declare a function as a metric of an episode with its name; its docstring is the meaning.
-
-    The metric is the mean of its values in an episode, from their sum, the field ``<name>_sum`` of the world's record.
-    The parameters of the function determine of what:
-
-    ========================= ========================================================================
-    (c, w)                    a value of the world, in each control step
-    (c, w, t)                 a value of each working tracker, in each control step
-    (c, w, trackers)          a value of the team, in each control step
-    (c, w, trackers, slots)   the same, with the slots
-    (s, w)                    nothing: called from Python with the scenario and the records of all
-                              worlds, it returns the metric of each, (E,)
-    ========================= ========================================================================
-
-    ``info`` reports the built-in metrics at the end of every episode, and others if the scenario names
-    them. ``nan`` stands for "never happened".
-
-    Args:
-        unit: Unit of the metric.
-    """
-    return METRICS.decorator(unit=unit)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TargetMotion(Declaration):
-    """A motion of the target; its function sets the goal heading. :func:`target_motion` describes the attributes."""
-
-    kind = "target motion"
-    signatures: ClassVar = {
-        "function": (
-            "(c, w) or (c, w, trackers) or (c, w, trackers, obstacles) or (c, w, trackers, obstacles, s)",
-            "nothing",
-        ),
-        "draw": ("(c, w)", "nothing"),
-    }
-
-    draw: Function | None
-    memory: Sequence[str]
-    mirrored: bool
-
-    def __post_init__(self) -> None:
-        """Raise DeclarationError also if an option has a wrong type, or a memory an invalid name."""
-        super().__post_init__()
-        given: Any = self.memory
-        if not isinstance(self.mirrored, bool):
-            raise self.error(f"mirrored={self.mirrored!r} must be True or False")
-        if not isinstance(given, (list, tuple)):
-            raise self.error(f"memory={given!r} must be a list of names")
-        for each in given:
-            if not isinstance(each, str) or not each.isidentifier() or keyword.iskeyword(each):
-                raise self.error(f"invalid name {each!r} of a memory: use a name that Python allows")
-
-
-def target_motion(
-    name: str, *, draw: Function | None = None, memory: Sequence[str] = (), mirrored: bool = True
-) -> Decorator:
+@dataclass(eq=False)
+class target_motion(Declaration):  # noqa: N801
     """Declare a function as a target motion; its docstring is the meaning.
 
     In every control step it sets the goal heading, ``w.goal_cos`` and ``w.goal_sin``, to which one steering law turns
@@ -430,29 +380,38 @@ def target_motion(
         memory: Names of its state variables, float32 fields of ``w``: 0 at the start, and part of the global state.
         mirrored: Whether the goal is mirrored near walls; not needed by a motion that avoids them.
     """
-    return TARGET_MOTIONS.decorator(name=name, draw=draw, memory=memory, mirrored=mirrored)
 
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Sensor(Declaration):
-    """A kind of target sensor; its function tells whether the target is in sight.
-
-    :func:`sensor` describes the attributes.
-    """
-
-    kind = "sensor"
+    kind = "target motion"
+    known: ClassVar = TARGET_MOTIONS
+    unit = "-"
     signatures: ClassVar = {
-        "function": ("(c, w, t, dx, dy) or (c, w, t, dx, dy, s)", "True or False"),
-        "measure": ("(c, w, number, dx, dy)", "2 numbers"),
+        "function": (
+            "(c, w) or (c, w, trackers) or (c, w, trackers, obstacles) or (c, w, trackers, obstacles, s)",
+            "nothing",
+        ),
+        "draw": ("(c, w)", "nothing"),
     }
 
-    choices: ClassVar = {"fix": ("position", "bearing")}
+    name: str
+    _: KW_ONLY
+    draw: Function | None = None
+    memory: Sequence[str] = ()
+    mirrored: bool = True
 
-    measure: Function | None
-    fix: str
+    def _check(self) -> None:
+        super()._check()
+        given: Any = self.memory
+        if not isinstance(self.mirrored, bool):
+            raise self.error(f"mirrored={self.mirrored!r} must be True or False")
+        if not isinstance(given, (list, tuple)):
+            raise self.error(f"memory={given!r} must be a list of names")
+        for each in given:
+            if not isinstance(each, str) or not each.isidentifier() or keyword.iskeyword(each):
+                raise self.error(f"invalid name {each!r} of a memory: use a name that Python allows")
 
 
-def sensor(name: str, *, measure: Function | None = None, fix: str = "position") -> Decorator:
+@dataclass(eq=False)
+class sensor(Declaration):  # noqa: N801
     """Declare a function as the sight of a kind of sensor; its docstring is the meaning.
 
     The function takes the scenario, the world, the tracker, the vector (dx, dy) to the target in
@@ -473,25 +432,31 @@ def sensor(name: str, *, measure: Function | None = None, fix: str = "position")
             ``range_noise`` and ``bearing_noise``.
         fix: The kind of a fix, ``"position"`` or ``"bearing"``.
     """
-    return SENSORS.decorator(name=name, measure=measure, fix=fix)
 
+    kind = "sensor"
+    known: ClassVar = SENSORS
+    unit = "-"
+    signatures: ClassVar = {
+        "function": ("(c, w, t, dx, dy) or (c, w, t, dx, dy, s)", "True or False"),
+        "measure": ("(c, w, number, dx, dy)", "2 numbers"),
+    }
+    choices: ClassVar = {"fix": ("position", "bearing")}
 
-FIELDS: Final = Registry(FieldDeclaration)
-METRICS: Final = Registry(Metric)
-REWARD_TERMS: Final = Registry(RewardTerm)
-SENSORS: Final = Registry(Sensor)
-TARGET_MOTIONS: Final = Registry(TargetMotion)
+    name: str
+    _: KW_ONLY
+    measure: Function | None = None
+    fix: str = "position"
 
 
 class Declarations(NamedTuple):
     """The declarations of a scenario, each kind in order of evaluation: the built-in ones, and those that it names."""
 
-    fields: tuple[FieldDeclaration, ...]
+    fields: tuple[field, ...]
     """Observation fields, except sonar and messages."""
-    motions: tuple[TargetMotion, ...]
-    sensors: tuple[Sensor, ...]
-    metrics: tuple[Metric, ...]
-    reward_terms: tuple[RewardTerm, ...]
+    motions: tuple[target_motion, ...]
+    sensors: tuple[sensor, ...]
+    metrics: tuple[metric, ...]
+    reward_terms: tuple[reward_term, ...]
 
     @classmethod
     def of(cls, scenario: Any) -> Declarations:

@@ -277,8 +277,8 @@ assert set(side) == {-1.0, 1.0}
 rates = s.target_turn_rate / (1 + 0.1 * s.control_step * np.arange(100))
 expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
 np.testing.assert_allclose(turned, side * expected[:, None], rtol=1e-4, atol=1e-3)
-np.testing.assert_array_equal(layout.views(layout.vector(batch.arrays))["unwind_side"], side)
-assert "unwind_side" not in StateLayout(posse.get_scenario("smart")).offsets
+np.testing.assert_array_equal(layout.views(layout.vector(batch.arrays))["world_unwind_side"], side)
+assert "world_unwind_side" not in StateLayout(posse.get_scenario("smart")).offsets
 
 # The metric, at any time and at the end of the episode; beside the built-in ones, which it leaves.
 metrics = batch.metrics()

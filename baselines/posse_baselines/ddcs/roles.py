@@ -72,14 +72,6 @@ def select_leader(team: Team, me: Record, mates: Records) -> None:
 
 
 @compiled
-def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool:
-    """Return whether a claim (term, leader) wins over another, whose leader may be -1: none."""
-    if old_leader < 0 or is_newer(term, old_term):
-        return True
-    return term == old_term and leader < old_leader
-
-
-@compiled
 def settle_lead(team: Team, me: Record, mates: Records) -> None:
     """Process received claims; hand over or appoint if due."""
     settings = team.settings
@@ -90,7 +82,7 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
         if mate.leader == me.leader and mate.term == me.term:
             if is_newer(mate.pulse, me.pulse):
                 me.pulse, me.pulse_step, me.confirmed = mate.pulse, me.step, 1
-        elif better_claim(mate.term, mate.leader, me.term, me.leader):
+        elif me.leader < 0 or is_newer(mate.term, me.term) or (mate.term == me.term and mate.leader < me.leader):
             appoint(me, mate.leader, mate.term, mate.pulse)
     if me.leader == me.number:
         me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1

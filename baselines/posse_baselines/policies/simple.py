@@ -31,22 +31,16 @@ class Idle(BasePolicy):
 class Random(BasePolicy):
     """Every number of every action is drawn uniformly from [-1, 1).
 
-    A draw is a function of the ``seed`` (at least 0) and of what the tracker is given, so that a world plays alike
-    alone and in any batch.
+    A draw is a function of what the tracker is given, so that a world plays alike alone and in any batch.
     """
 
     name = "random"
-
-    def __init__(self, seed: int = 0) -> None:
-        if not 0 <= seed < 2**63:
-            raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
-        self.seed = seed
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the factors (N, 2 + m, F) that make draws of observations."""
         s = super().begin(layout, num_worlds).scenario
         shape = s.num_trackers, 2 + s.message_size, layout.size
-        return np.random.default_rng(self.seed).integers(2**64, size=shape, dtype=np.uint64)
+        return np.random.default_rng(0).integers(2**64, size=shape, dtype=np.uint64)
 
     def arrays(self, memory: Memory) -> dict[str, Any]:
         """Return none: the factors are always those of :meth:`begin`."""

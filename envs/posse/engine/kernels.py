@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import Declarations, RewardTerm
+from posse.declarations import Declarations, reward_term
 from posse.numeric import UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.numeric.compile import stamp
 from posse.numeric.lanes import fetch
@@ -187,7 +187,7 @@ def advance_worlds(
     return over
 
 
-def fixed_for(scenario: Scenario, terms: Iterable[RewardTerm], worlds: WorldArrays, threads: int) -> Fixed:
+def fixed_for(scenario: Scenario, terms: Iterable[reward_term], worlds: WorldArrays, threads: int) -> Fixed:
     """Return the arguments of a scenario with these reward terms; those that it does not weight count 0."""
     given = dict(scenario.reward_weights), dict(scenario.target_reward_weights)
     weights, target_weights = (np.array([each.get(term.name, 0.0) for term in terms], np.float32) for each in given)

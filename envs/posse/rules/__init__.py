@@ -3,9 +3,8 @@
 The names below are public: records, constants and functions for policies and users' own modules.
 """
 
-from posse.rules.kinematics import arc
+from posse.rules.kinematics import arc, in_frame
 from posse.rules.randomness import SENSOR_NOISE, TARGET, between, normal_pair, uniform
-from posse.rules.score import place
 from posse.rules.state import CONFIG, NEVER, TRACKER, beam_directions, config_record, slot_records, world_record
 from posse.rules.targets.smart import DART_TURN, PATIENCE
 from posse.scenarios.setting import SPLITS
@@ -23,8 +22,8 @@ __all__ = [
     "beam_directions",
     "between",
     "config_record",
+    "in_frame",
     "normal_pair",
-    "place",
     "slot_records",
     "uniform",
     "world_record",

@@ -40,7 +40,7 @@ def move_swept(c: Record, robot: Record, number: int, obstacles: Records, s: Rec
 
 
 @compiled
-def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
+def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, wanted: FloatArray, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first."""
     lay_out_robots(c, w, trackers, s)
     for _ in range(c.physics_steps):
@@ -48,14 +48,14 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s
             move_swept(c, w, c.num_trackers, obstacles, s)
         for i, t in enumerate(trackers):
             if t.near != 0 and t.broken_at == NEVER:
-                obey(c, t, s.wanted_speed[i], s.wanted_turn[i])
+                obey(c, t, wanted[i])
                 move_swept(c, t, i, obstacles, s)
 
 
 @compiled
-def obey(c: Record, t: Record, wanted_speed: np.float32, wanted_turn: np.float32) -> None:
+def obey(c: Record, t: Record, wanted: FloatArray) -> None:
     """Set a tracker's speed and turn rate after an action, within the limits."""
-    to_speed, to_turn = HALF * (wanted_speed + ONE) * t.max_speed, wanted_turn * t.max_turn_rate
+    to_speed, to_turn = HALF * (wanted[0] + ONE) * t.max_speed, wanted[1] * t.max_turn_rate
     if c.actuator_lag > ZERO:
         to_speed = t.speed + c.followed * (to_speed - t.speed)
         to_turn = t.turn_rate + c.followed * (to_turn - t.turn_rate)
@@ -64,18 +64,6 @@ def obey(c: Record, t: Record, wanted_speed: np.float32, wanted_turn: np.float32
     if c.wheel_base > ZERO:
         left = t.max_speed - HALF * c.wheel_base * abs(t.turn_rate)
         t.speed = lesser(t.speed, greater(left, ZERO))  # on the spot, rounding may leave less than nothing
-
-
-@compiled
-def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray, s: Record) -> None:
-    """Write the motions to execute now: those of the actions, or the ones of ``command_delay`` steps ago."""
-    for i in range(c.num_trackers):
-        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
-    if c.command_delay > 0:
-        kept = command[w.step % c.command_delay]
-        for i in range(c.num_trackers):
-            s.wanted_speed[i], s.wanted_turn[i] = kept[i, 0], kept[i, 1]
-            kept[i, 0], kept[i, 1] = actions[i, 0], actions[i, 1]
 
 
 @compiled
@@ -98,7 +86,9 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     step; a robot with something near moves in swept physics steps.
     """
     w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
-    take_commands(c, w, actions, worlds.command[e], s)
+    wanted = actions
+    if c.command_delay > 0:
+        wanted = worlds.command[e, w.step % c.command_delay]
     if c.target_agent != 0:
         action = actions[c.num_trackers]
         w.speed = HALF * (action[0] + ONE) * c.target_speed
@@ -117,10 +107,12 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
             near = True
         elif t.broken_at == NEVER:
             for _ in range(parts):
-                obey(c, t, s.wanted_speed[i], s.wanted_turn[i])
+                obey(c, t, wanted[i])
                 move_freely(t, time)
     if near:
-        move_in_parts(c, w, trackers, obstacles, s)
+        move_in_parts(c, w, trackers, obstacles, wanted, s)
+    for i in range(c.num_trackers if c.command_delay > 0 else 0):
+        wanted[i, 0], wanted[i, 1] = actions[i, 0], actions[i, 1]
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
     )

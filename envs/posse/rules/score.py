@@ -16,12 +16,6 @@ from posse.rules.state import BIT, NEVER, NO_BITS
 
 
 @compiled
-def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
-    """Return a tracker's position in the slot frame, (ahead, left) of the target, m."""
-    return in_frame(t.x - w.x, t.y - w.y, w.frame_cos, w.frame_sin)
-
-
-@compiled
 def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -> None:
     """Determine which tracker occupies which slot, and the distance of each from a free slot.
 

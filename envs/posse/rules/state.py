@@ -421,8 +421,6 @@ SCRATCH: Final = record_type(
     ("slot_distance2", _F, TEAM),  # squared, m²
     # Motion.
     ("worth", _F, 2 * WIDTH),  # value of each direction considered by a smart target
-    ("wanted_speed", _F, TEAM),  # commanded by each tracker's action
-    ("wanted_turn", _F, TEAM),
     # Observations: eight numbers, one for each of eight worlds.
     ("team_x", _F, (TEAM, WIDTH)),  # of each tracker
     ("team_y", _F, (TEAM, WIDTH)),

@@ -18,7 +18,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, Declarations, undeclared, unknown
+from posse.declarations import (
+    FIELDS,
+    METRICS,
+    REWARD_TERMS,
+    SENSORS,
+    TARGET_MOTIONS,
+    Declarations,
+    field,
+    metric,
+    reward_term,
+    undeclared,
+    unknown,
+)
 from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
@@ -472,9 +484,9 @@ def _in_time_and_space(s: Scenario) -> _Conflicts:
 def _in_declarations(s: Scenario) -> _Conflicts:
     of_target = {name: term for name, term in REWARD_TERMS.items() if term.of_target is not None}
     for where, names, kind, known in (
-        ("extra_fields", s.extra_fields, FIELDS.kind, FIELDS),
-        ("metrics", s.metrics, METRICS.kind, METRICS),
-        ("reward_weights", dict(s.reward_weights), REWARD_TERMS.kind, REWARD_TERMS),
+        ("extra_fields", s.extra_fields, field.kind, FIELDS),
+        ("metrics", s.metrics, metric.kind, METRICS),
+        ("reward_weights", dict(s.reward_weights), reward_term.kind, REWARD_TERMS),
         ("target_reward_weights", dict(s.target_reward_weights), "term of a target", of_target),
     ):
         for name in names:

@@ -15,7 +15,7 @@ from typing import Any, Final
 import posse.signals.metrics
 import posse.signals.own_fields
 import posse.signals.reward  # noqa: F401  (declare the built-in metrics, fields and terms)
-from posse.declarations import Declarations, FieldDeclaration, Function, Metric, parameters_of, place_of
+from posse.declarations import Declarations, Function, field, metric, parameters_of, place_of
 from posse.numeric import WIDTH
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.views import Generated
@@ -110,17 +110,17 @@ class _Module:
             alias += "_"
         return f"{alias}({', '.join(parameters_of(function))})"
 
-    def _columns(self, fields: Iterable[FieldDeclaration]) -> Iterator[str]:
+    def _columns(self, fields: Iterable[field]) -> Iterator[str]:
         columns: list[str] = []
         width = _size(fields)
         blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]  # the last one repeats columns of the one before
-        for field in fields:
-            mine = [f"{field.name}_{q}" for q in range(field.size)]
-            yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
-            if "v" not in parameters_of(field.function):  # a constant
+        for each in fields:
+            mine = [f"{each.name}_{q}" for q in range(each.size)]
+            yield f"{', '.join(mine)} = {self._call(f'field_{each.name}', each.function)}"
+            if "v" not in parameters_of(each.function):  # a constant
                 yield from (f"{column} = eight(float32({column}))" for column in mine)
-            if field.of_neighbour:
-                yield from (f"{column} = choose(there, {column}, float32({field.unknown or 0}))" for column in mine)
+            if each.of_neighbour:
+                yield from (f"{column} = choose(there, {column}, float32({each.unknown or 0}))" for column in mine)
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
             while blocks and len(columns) >= blocks[0] + WIDTH:
@@ -141,17 +141,17 @@ class _Module:
             if function is not None:
                 yield from (f"if c.{setting} == {k}:", f"    {statement.format(self._call(name, function))}")
 
-    def _sums(self, metrics: Iterable[Metric]) -> Iterator[str]:
+    def _sums(self, metrics: Iterable[metric]) -> Iterator[str]:
         loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += float32(w.working)"]
-        for metric in metrics:
-            value = self._call(f"metric_{metric.name}", metric.function)
-            if "t" in parameters_of(metric.function):
-                yield f"{metric.name}_total = ZERO"
-                loop.append(f"    {metric.name}_total += {value}")
-                value = f"{metric.name}_total"
-            after.append(f"w.{metric.sum_name} += {value}")
+        for each in metrics:
+            value = self._call(f"metric_{each.name}", each.function)
+            if "t" in parameters_of(each.function):
+                yield f"{each.name}_total = ZERO"
+                loop.append(f"    {each.name}_total += {value}")
+                value = f"{each.name}_total"
+            after.append(f"w.{each.sum_name} += {value}")
         yield from ("for i in range(c.num_trackers):", *(f"    {line}" for line in loop), *after)
 
 
-def _size(fields: Iterable[FieldDeclaration]) -> int:
-    return sum(field.size for field in fields)
+def _size(fields: Iterable[field]) -> int:
+    return sum(each.size for each in fields)

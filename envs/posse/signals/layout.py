@@ -112,8 +112,7 @@ class StateLayout:
     """The entries of a scenario's state vector, in physical units; control steps are times in s.
 
     Attributes:
-        fields: Name of every entry, in order, and its field of :meth:`posse.rules.state.WorldArrays.by_name`.
-        shapes: Shape of each, by name.
+        shapes: Shape of every entry, in order, by its name in :attr:`posse.Batch.state`.
         size: S, length of the vector.
         offsets: Index of the first number of each entry, by name.
     """
@@ -122,16 +121,15 @@ class StateLayout:
         self._control_step = scenario.control_step
         one = WorldArrays.allocate(scenario, 1).by_name()
         # A scenario without obstacles, messages or a radio that fails has nothing to say of them.
-        self.fields = {name: field for name, field in _entries(scenario).items() if one[field].size}
-        self.shapes = {name: one[field].shape[1:] for name, field in self.fields.items()}
+        self.shapes = {name: one[name].shape[1:] for name in _entries(scenario) if one[name].size}
         ends = np.cumsum([math.prod(shape) for shape in self.shapes.values()]).tolist()
-        self.offsets = dict(zip(self.fields, [0, *ends], strict=False))
+        self.offsets = dict(zip(self.shapes, [0, *ends], strict=False))
         self.size: int = ends[-1]
 
     def vector(self, arrays: WorldArrays) -> FloatArray:
         """Return the states of a batch's worlds, a new array (E, S) float32."""
         fields = arrays.by_name()
-        parts = [self._read(field, fields).reshape(len(arrays.world), -1) for field in self.fields.values()]
+        parts = [self._read(field, fields).reshape(len(arrays.world), -1) for field in self.shapes]
         return np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind")
 
     def _read(self, field: str, fields: Mapping[str, _Values]) -> _Values:
@@ -163,28 +161,20 @@ class StateLayout:
         return views
 
 
-def _entries(s: Scenario) -> dict[str, str]:
-    """Return every entry, in order, with its field.
+def _entries(s: Scenario) -> tuple[str, ...]:
+    """Return the names of all entries, in order.
 
     A time is -1 where there is none. Commands, messages and what was sent come newest first; what was heard, by
     receiver and sender.
     """
-    memory = [each for motion in Declarations.of(s).motions for each in motion.memory]
+    memory = (each for motion in Declarations.of(s).motions for each in motion.memory)
     errors = _ERRORS if s.drifts else ()
-    return {
-        "time": "world_step",
-        **{f"target_{k}": f"world_{k}" for k in (*_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin")},
-        **{name: f"world_{name}" for name in memory},
-        "next_break": "world_break_step",
-        "breaks_left": "world_breaks_left",
-        **{f"tracker_{k}": f"tracker_{k}" for k in (*_POSE, *_FIX, "fix_vx", "fix_vy")},
-        "tracker_fix_time": "tracker_fix_step",
-        **{k: k for k in ("tracker_broken_at", "tracker_breaks_at", "tracker_sensor_dead_from")},
-        **{k: k for k in ("tracker_radio_dead_from", "tracker_sees", *errors, "command")},
-        **{k: k for k in ("obstacle_x", "obstacle_y", "obstacle_radius", "message", "heard_message")},
-        "heard_time": "heard_step",
-        **{f"heard_{k}": f"heard_{k}" for k in _POSE},
-        "sent": "broadcast_sent",
-        "sent_fix_time": "broadcast_fix_step",
-        **{f"sent_{k}": f"broadcast_{k}" for k in (*_POSE, *_FIX, *errors)},
-    }
+    world = ("step", *_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin", *memory, "break_step", "breaks_left")
+    faults = ("broken_at", "breaks_at", "sensor_dead_from", "radio_dead_from", "sees")
+    return (
+        *(f"world_{name}" for name in world),
+        *(f"tracker_{name}" for name in (*_POSE, *_FIX, "fix_vx", "fix_vy", "fix_step", *faults)),
+        *(*errors, "command", "obstacle_x", "obstacle_y", "obstacle_radius", "message", "heard_message"),
+        *(f"heard_{name}" for name in ("step", *_POSE)),
+        *(f"broadcast_{name}" for name in ("sent", "fix_step", *_POSE, *_FIX, *errors)),
+    )

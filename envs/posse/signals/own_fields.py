@@ -139,13 +139,13 @@ def max_turn_rate(c: Record, v: View) -> Lanes:
 @field("s", 0, lambda s: max(1, max(s.tracker_speeds) / s.tracker_acceleration * SLACK))
 def acceleration_time(c: Record, v: View) -> Lanes:
     """Time from rest to full speed; 0: no acceleration limit."""
-    return v.acceleration_time
+    return choose(v.number < ZERO, ZERO, v.max_speed * c.per_acceleration)  # of a target agent: 0
 
 
 @field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK))
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
-    return v.turn_acceleration_time
+    return choose(v.number < ZERO, ZERO, v.max_turn_rate * c.per_turn_acceleration)
 
 
 for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range"):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from posse.declarations import RewardTerm, reward_term
+from posse.declarations import reward_term
 from posse.numeric import ONE, ZERO, FloatArray, Record
 
 
@@ -66,7 +66,7 @@ def team(c: Record, w: Record) -> np.float32:
     return np.float32(w.score)
 
 
-def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatArray) -> None:
+def check_terms(terms: Sequence[reward_term], rewards: FloatArray, values: FloatArray) -> None:
     """Raise DeclarationError if a reward is not finite, for the term whose value (..., K) is not."""
     if np.isfinite(rewards).all():
         return

@@ -94,10 +94,6 @@ class View(NamedTuple):
     """m/s."""
     max_turn_rate: Lanes
     """rad/s."""
-    acceleration_time: Lanes
-    """From rest to full speed, s; 0: at once."""
-    turn_acceleration_time: Lanes
-    """From no turn to the greatest turn rate, s; 0: at once."""
     target_known: Mask
     """Whether it has a fix of the target, described by the following."""
     target_seen: Lanes
@@ -163,7 +159,6 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         condition = Condition(*columns(worlds.tracker[:, i], first, end, CONDITION))
         touching, sees, fixed_at = counts(condition.touching), counts(condition.sees), counts(condition.fix_step)
         working = choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
-        per_acceleration, per_turn_acceleration = c.per_acceleration, c.per_turn_acceleration
     else:  # a target agent: its limits act at once, and it has no target
         zero, number = eight(ZERO), eight(-ONE)
         x, y, cos, sin, speed, turn_rate, _, _ = target
@@ -171,7 +166,6 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         fix = Fix(zero, zero, zero, zero, zero, zero, zero, zero)
         touching, sees, fixed_at = counts(target.in_contact), zero, number
         working = eight(ONE)
-        per_acceleration = per_turn_acceleration = ZERO
     dx, dy = fix.x, fix.y
     if c.fix_bearing == 0:
         dx, dy = dx - own.x, dy - own.y
@@ -188,8 +182,6 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         step=counts(target.step),
         max_speed=own.max_speed,
         max_turn_rate=own.max_turn_rate,
-        acceleration_time=own.max_speed * per_acceleration,
-        turn_acceleration_time=own.max_turn_rate * per_turn_acceleration,
         target_known=fixed_at >= ZERO,
         target_seen=sees,
         target_step=fixed_at,

@@ -13,7 +13,7 @@ import numpy as np
 
 from posse import Batch, Scenario
 from posse.numeric import FloatArray, Records, kernel
-from posse.rules import NEVER, config_record, place
+from posse.rules import NEVER, config_record, in_frame
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -35,16 +35,14 @@ def _write(config: Records, world: Records, tracker: Records, obstacle: Records,
                 o[k] = _ZERO
             o[0] = w.speed
             o[1] = w.turn_rate
-            o[2] = w.heading_cos * w.frame_cos + w.heading_sin * w.frame_sin
-            o[3] = w.heading_sin * w.frame_cos - w.heading_cos * w.frame_sin
+            o[2], o[3] = in_frame(w.heading_cos, w.heading_sin, w.frame_cos, w.frame_sin)
             o[4] = w.score
             o[5] = np.float32(c.horizon - w.step) * c.control_step
             for j in range(n):
                 t = tracker[e, (i + j) % n]
                 k = TARGET_SIZE + j * TRACKER_SIZE
-                o[k], o[k + 1] = place(c, w, t)
-                o[k + 2] = t.heading_cos * w.frame_cos + t.heading_sin * w.frame_sin
-                o[k + 3] = t.heading_sin * w.frame_cos - t.heading_cos * w.frame_sin
+                o[k], o[k + 1] = in_frame(t.x - w.x, t.y - w.y, w.frame_cos, w.frame_sin)
+                o[k + 2], o[k + 3] = in_frame(t.heading_cos, t.heading_sin, w.frame_cos, w.frame_sin)
                 o[k + 4] = t.speed
                 o[k + 5] = t.turn_rate
                 o[k + 6] = _ONE if t.broken_at == NEVER else _ZERO
@@ -54,8 +52,9 @@ def _write(config: Records, world: Records, tracker: Records, obstacle: Records,
                 o[k + 10] = np.float32(t.touching)
             for m in range(c.num_obstacles):
                 k = TARGET_SIZE + places * TRACKER_SIZE + m * OBSTACLE_SIZE
-                o[k], o[k + 1] = place(c, w, obstacle[e, m])
-                o[k + 2] = obstacle[e, m].radius
+                disc = obstacle[e, m]
+                o[k], o[k + 1] = in_frame(disc.x - w.x, disc.y - w.y, w.frame_cos, w.frame_sin)
+                o[k + 2] = disc.radius
 
 
 class StateWriter:
