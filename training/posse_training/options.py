@@ -48,6 +48,18 @@ def settings_of(words: Sequence[str]) -> dict[str, Any]:
     return found
 
 
+def changes_of(words: Sequence[str]) -> dict[str, Any]:
+    """Return :func:`settings_of` for a scenario; ValueError also for a name that is none of its settings."""
+    from posse import Scenario
+    from posse.declarations import unknown
+
+    found, known = settings_of(words), Scenario.settings().keys() - {"name", "version", "meaning"}
+    for name in found:
+        if name not in known:
+            raise ValueError(unknown("setting", name, sorted(known)))
+    return found
+
+
 def words_of(settings: Mapping[str, Any]) -> list[str]:
     """Return the words that stand for settings, as :func:`settings_of` reads them."""
     lists = {name: value for name, value in settings.items() if isinstance(value, (tuple, list))}
@@ -74,7 +86,7 @@ def _words(
 
 Pairs = Annotated[dict[str, Any], _words(dict, settings_of, words_of, "KEY=VALUE ...")]
 """Type of an option that takes ``KEY=VALUE ...``."""
-Changes = Annotated[Pairs, tyro.conf.arg(name="set")]
+Changes = Annotated[dict[str, Any], _words(dict, changes_of, words_of, "KEY=VALUE ..."), tyro.conf.arg(name="set")]
 """Type of the option ``--set``."""
 _NAMES: Final = _words(
     (str, type(None)),

@@ -125,7 +125,9 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
 
 def _checked(settings: Settings) -> list[Scenario | Family]:
     check_settings(settings)
-    names = scenario_names() if settings.scenario == ("all",) else settings.scenario
+    if not settings.scenario:
+        raise SettingsError("no scenario is given: name one or several, or all")
+    names = scenario_names() if "all" in settings.scenario else settings.scenario
     found = [scenario_or_family(name, **settings.overrides) for name in dict.fromkeys(names)]
     for scenario in found:
         first, _ = next(blocks(scenario, range(1), 0, "train"))
