@@ -54,7 +54,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
     for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
         with killed_at(owner, name, call):
             play_league(tiny(tmp_path / "cut"), console=quiet())
-    play_league(tiny(tmp_path / "cut"), console=quiet())
+    play_league(tiny(tmp_path / "whole" / ".." / "cut"), console=quiet())
     assert everything(tmp_path / "cut") == everything(tmp_path / "whole")
 
     again = play_league(tiny(tmp_path / "whole"), console=quiet())

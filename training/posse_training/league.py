@@ -98,11 +98,11 @@ class LeagueSettings:
     @property
     def path(self) -> Path:
         """The folder that the league is kept in."""
-        return self.folder or Path("runs/league") / self.scenario
+        return (self.folder or Path("runs/league") / self.scenario).resolve()  # members are opponents by their paths
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the settings as plain values, without the folder."""
-        return {**asdict(self), "folder": None}
+        """Return the settings as plain values, without the folder, and the scenario's version."""
+        return {**asdict(self), "folder": None, "version": get_scenario(self.scenario).version}
 
 
 @dataclass(frozen=True)

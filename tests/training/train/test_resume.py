@@ -79,6 +79,9 @@ def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
 def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Path) -> None:
     train(small(tmp_path), console=quiet())
     settings = json.loads((tmp_path / "settings.json").read_text())
+    (tmp_path / "settings.json").write_text(json.dumps({**settings, "versions": [0]}))
+    with pytest.raises(RunFolderError, match=r"holds a run with versions=\[0\], not \[\d+\]"):
+        train(small(tmp_path), console=quiet())
     (tmp_path / "settings.json").write_text(json.dumps({**settings, "hidden": [8, 8]}))
     with pytest.raises(RunFolderError, match="does not fit"):
         resume(tmp_path)

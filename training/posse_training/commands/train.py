@@ -91,7 +91,7 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
 
     for settings in runs:
         check_before(settings)
-        check_held(settings.run_folder / SETTINGS, settings.to_dict(), FREE)
+        check_held(settings.run_folder / SETTINGS, settings.held(), FREE)
     if ray is False:
         return [train(settings) for settings in runs]
     with connected(ray, log=True):

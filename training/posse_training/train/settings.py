@@ -202,6 +202,10 @@ class TrainSettings:
         """Return the settings as plain values, without the folder."""
         return {**dataclasses.asdict(self), "folder": None}
 
+    def held(self) -> dict[str, Any]:
+        """Return what must be the same when a run is resumed: the settings, and the versions of the scenarios."""
+        return {**self.to_dict(), "versions": [each.version for each in self.given]}
+
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Return the settings of :meth:`to_dict`.
@@ -209,7 +213,7 @@ class TrainSettings:
         Raises:
             SettingsError: An unknown setting, or an invalid value.
         """
-        fitted = {**values}
+        fitted = {name: value for name, value in values.items() if name != "versions"}
         known = {f.name for f in dataclasses.fields(cls)}
         for name in fitted:
             if name not in known:

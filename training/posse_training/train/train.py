@@ -53,7 +53,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
         stack.enter_context(locked(folder))
-        check_held(folder / SETTINGS, settings.to_dict(), FREE, (BEST, LAST, checkpoint.CHECKPOINT))
+        check_held(folder / SETTINGS, settings.held(), FREE, (BEST, LAST, checkpoint.CHECKPOINT))
         # A run killed before its first checkpoint starts again, with the same result.
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         stack.callback(torch.set_num_threads, torch.get_num_threads())
@@ -61,7 +61,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         display = Display(settings, console or Console())
         stack.enter_context(display.bar)
         if settings.algorithm == EVOLUTION:
-            hold_settings(folder / SETTINGS, settings.to_dict(), FREE)
+            hold_settings(folder / SETTINGS, settings.held(), FREE)
             display.beside = score_beside(settings, display)
             return evolve(settings, folder, display, num_threads)
         env = make_env(settings, num_threads)
@@ -75,7 +75,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         else:
             run.restore(saved)
             display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
-        hold_settings(folder / SETTINGS, settings.to_dict(), FREE)  # now that it can begin
+        hold_settings(folder / SETTINGS, settings.held(), FREE)  # now that it can begin
         display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
