@@ -7,7 +7,7 @@ import pytest
 
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
-from posse_training.errors import SettingsError
+from posse_training.errors import PlayError, SettingsError
 from posse_training.leaderboard import CLAIM, Standing, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
@@ -58,6 +58,8 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
 def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         verify(sent(tmp_path, claim, **changes))
+    with pytest.raises(PlayError, match="LocalError"):
+        verify(sent(tmp_path, claim, policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
 
 
 def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:

@@ -181,6 +181,7 @@ def verify(
 
     Raises:
         SettingsError: An invalid claim, code without ``run_code``, or another version of the scenario.
+        PlayError: An error of the policy's own code.
     """
     rows = read_standings(path := folder / CLAIM)
     if len(rows) != 1:
@@ -192,7 +193,8 @@ def verify(
         raise SettingsError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
     policy = load(str(folder / text) if Path(text).suffix in FILES else text)
     drawn = secrets.randbelow(2**31) if seed is None else seed
-    return claim, measure(claim.label, text, policy, claim.scenario, episodes, drawn)
+    with played_errors():
+        return claim, measure(claim.label, text, policy, claim.scenario, episodes, drawn)
 
 
 def submit_command(arguments: Sequence[str]) -> None:

@@ -45,8 +45,9 @@ def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
     assert not np.array_equal(means[0], means[-1])
 
 
-def test_the_state_changes_values_but_no_actions(tmp_path: Path) -> None:
-    settings = small(tmp_path, "mappo")
+@pytest.mark.parametrize("hidden", [(8,), ()])
+def test_the_state_changes_values_but_no_actions(tmp_path: Path, hidden: tuple[int, ...]) -> None:
+    settings = small(tmp_path, "mappo", hidden=hidden)
     env = make_env(settings)
     policy: Any = ALGORITHMS["mappo"].make(settings, env).policy
     rows = torch.from_numpy(env.reset()).requires_grad_()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import load
+from posse_baselines import PolicyError, load
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.safeguard import Guard
 from posse_training.train.vec_env import TeamVecEnv
@@ -161,6 +161,8 @@ def test_invalid_batches_are_refused(batches: list[dict[str, Any]], message: str
     moved = posse.batch("constant", 1, autoreset="disabled", team_policy=load("pursuit"))
     with pytest.raises(ValueError, match="see_state needs all trackers moved from outside, here 1 are"):
         TeamVecEnv([moved], Encoding.of(moved.layout), see_state=True)
+    with pytest.raises(PolicyError, match="not for a target moved from outside"):
+        TeamVecEnv([moved], Encoding.of(moved.layout), safeguard=True)
 
 
 def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> None:

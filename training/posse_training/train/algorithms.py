@@ -187,6 +187,8 @@ def check_algorithm(settings: TrainSettings) -> None:
 
 
 def even_minibatch(rows: int, wanted: int) -> int:
-    """Return the divisor of ``rows`` that is nearest to ``wanted`` in proportion."""
+    """Return the divisor of ``rows`` that is nearest to ``wanted`` in proportion; SettingsError below two rows."""
+    if rows < 2:
+        raise SettingsError(f"a rollout of {rows} row is too short to learn from: raise rollout or num_worlds")
     sizes = [d for k in range(1, int(rows**0.5) + 1) if rows % k == 0 for d in (k, rows // k)]
     return min(sizes, key=lambda size: max(size / wanted, wanted / size))

@@ -104,6 +104,7 @@ class CentralizedCriticPolicy(ActorCriticPolicy):
         hidden: Any = self.net_arch
         layers = create_mlp(self.private_size, 0, hidden, self.activation_fn)
         self.mlp_extractor.policy_net = nn.Sequential(Front(self.private_size), *layers)
+        self.mlp_extractor.latent_dim_pi = hidden[-1] if hidden else self.private_size
 
 
 ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": nn.Tanh, "relu": nn.ReLU}

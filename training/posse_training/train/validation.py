@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from posse_baselines import PolicyError, Target, load, load_target
-from posse_training.errors import SettingsError
-from posse_training.evaluation.evaluation import evaluate
+from posse_training.errors import PlayError, SettingsError
+from posse_training.evaluation.evaluation import evaluate, played_errors
 from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import mean
 from posse_training.train.display import Display
@@ -49,8 +49,9 @@ def score_beside(settings: TrainSettings, display: Display) -> float | None:
         return None
     display.note(f"evaluating {settings.beside} on the validation worlds")
     try:
-        return validate(settings, LOAD[settings.side](settings.beside))["safe_score"]
-    except PolicyError as error:
+        with played_errors():
+            return validate(settings, LOAD[settings.side](settings.beside))["safe_score"]
+    except (PolicyError, PlayError) as error:
         display.note(f"no score of {settings.beside}: {error}")
         return None
 

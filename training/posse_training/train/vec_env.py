@@ -18,6 +18,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
+from posse_baselines import PolicyError
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.safeguard import Guard
 from posse_training.train.world_state import StateWriter
@@ -52,7 +53,7 @@ class TeamVecEnv(VecEnv):
 
     Raises:
         ValueError: A batch that resets itself, a target that is an agent, or batches whose actions differ in length.
-        PolicyError: An encoding that does not fit.
+        PolicyError: An encoding that does not fit, or a safeguard of a target.
     """
 
     def __init__(
@@ -182,6 +183,8 @@ class SlotGroup:
     def __init__(self, batch: Batch, encoding: Encoding, state: StateWriter | None, safeguard: bool = False) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
+        if safeguard and trackers != batch.scenario.num_trackers:
+            raise PolicyError("safeguard=True is for trackers, not for a target moved from outside: leave it out")
         self.num_slots = worlds * trackers
         self.size = encoding.size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
