@@ -6,13 +6,26 @@ from pufferlib.emulation import GymnasiumPufferEnv, PettingZooPufferEnv
 
 import posse
 
-settings = {"scenario": "smart", "discrete_actions": True}
-one = partial(gymnasium.make, "posse/Solo-v0", **settings)
+settings = {
+    "scenario": "smart",
+    "horizon": 20,
+    "discrete_actions": True,
+}
+
+
+def one():
+    env = gymnasium.make("posse/Solo-v0", **settings)
+    # PufferLib does not reset episodes that are truncated.
+    return gymnasium.wrappers.Autoreset(env)
+
+
 team = partial(posse.parallel_env, **settings)
 kinds = (GymnasiumPufferEnv, one), (PettingZooPufferEnv, team)
 for kind, creator in kinds:
     make = partial(kind, env_creator=creator)
     envs = pufferlib.vector.make(make, num_envs=4)
     observations, infos = envs.reset(seed=1)
-    observations, rewards, *rest = envs.step(envs.action_space.sample())
+    for _ in range(50):
+        actions = envs.action_space.sample()
+        observations, rewards, *rest = envs.step(actions)
     print(observations.shape)

@@ -194,7 +194,7 @@ class PosseEnv(EnvBase):
             packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
         worlds = self.batch.arrays.world
         ended, terminated = worlds["over"] != 0, worlds["terminated"] != 0
-        ends = {"terminated": terminated, "truncated": ended & ~terminated}  # TorchRL adds "done"
+        ends = {"done": ended, "terminated": terminated, "truncated": ended & ~terminated}
         for name, values in {"score": worlds["score"].copy(), **ends}.items():
             packed.set(name, self._tensor(values).unsqueeze(-1))
         if self._state_layout is not None:

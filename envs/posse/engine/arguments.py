@@ -83,7 +83,7 @@ def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions
     allowed = np.isfinite(actions) if clip else np.abs(actions) <= MOST_ACTION
     if not allowed.all():
         e, i, k = np.argwhere(~allowed)[0]
-        fix = "it must be finite" if clip else "scale the policy's output, or pass clip_actions=True"
+        fix = "it must be finite" if clip else "scale or clip the policy's output (environments: clip_actions=True)"
         raise ValueError(f"{place(e, i, k)} = {actions[e, i, k]} is not a number in [-1, 1]: {fix}")
     return actions.clip(-1, 1)
 

@@ -28,6 +28,7 @@ Point = Sequence[float] | npt.NDArray[np.float64]
 def _font(size: int) -> pygame.font.Font:
     """Return pygame's bundled font, so that frames are equal on every machine."""
     pygame.font.init()
+    pygame.register_quit(_font.cache_clear)  # fonts do not outlive it, and other libraries quit pygame, too
     return pygame.font.Font(None, size)
 
 
@@ -145,6 +146,8 @@ class Window:
 
         A paused window shows it until the user steps, goes on, or presses one of the caller's keys.
         """
+        if not pygame.display.get_init():  # another library quit pygame
+            return False
         self._paint(frame)
         while True:
             while (event := pygame.event.poll()).type != pygame.NOEVENT:  # one by one: a step leaves the others

@@ -84,6 +84,7 @@ def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
         "import sys, posse; print('pygame' in sys.modules);"
         "from posse.rendering.renderer import Renderer; import pygame;"
         "b = posse.batch('constant'); b.reset();"
-        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
+        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init());"
+        "pygame.quit(); Renderer(b.scenario).draw(b)"  # as other environments do when they are closed
     )
     assert printed("-c", code).split() == ["False", "(640,", "640,", "3)", "False"]

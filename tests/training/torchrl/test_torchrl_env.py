@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 import torch
 from tensordict import TensorDictBase
+from torchrl.envs import SerialEnv
 from torchrl.envs.utils import check_env_specs
 
 import posse
@@ -106,6 +107,12 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     assert torch.equal(after[~marks], before[~marks])
     assert (after[marks] != before[marks]).flatten(1).any(1).all()
     assert env.batch.arrays.world["episode"].tolist() == [0, 1, 0, 1, 1, 0]
+
+
+@pytest.mark.parametrize("buffers", [True, False])
+def test_the_ends_of_episodes_reach_serial_environments(buffers: bool) -> None:
+    rolled = SerialEnv(2, lambda: PosseEnv("smart", WORLDS, horizon=5), use_buffers=buffers).rollout(8)
+    assert rolled["next", "done"].sum(dim=2).flatten().tolist() == [1] * (2 * WORLDS)
 
 
 def test_a_choice_of_autoreset_or_of_a_team_is_refused() -> None:
