@@ -34,7 +34,8 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
     :class:`posse_training.sb3.TeamVecEnv`, plays every tracker of the team; one of (N, F), as in
     ``posse/Team-v0``, the whole team. Discrete actions are understood too, and so are recurrent
-    policies: their states restart with the episode. Actions are the mode of the model's distribution.
+    policies: their states restart with the episode. Actions are the mode of the model's distribution. A model of a
+    target is refused where it would play: ``posse train --side target`` makes targets.
 
     Args:
         model: A model; one from a file is ``PPO.load(path)``, by the class of its algorithm.
