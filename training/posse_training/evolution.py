@@ -29,9 +29,8 @@ from posse_baselines.learned.features import FEATURES
 from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_training.errors import require
-from posse_training.files import hold_settings, intact
+from posse_training.files import hold_settings, intact, write_csv
 from posse_training.provenance import software
-from posse_training.train.checkpoint import write_curve
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
 from posse_training.train.settings import BEST, CURVE, LAST, TrainSettings
@@ -76,7 +75,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         point |= validate(s, team([cma.mean]))
         best = max((earlier["safe_score"] for earlier in curve), default=-1.0)
         curve.append(point)
-        write_curve(folder / CURVE, curve)
+        write_csv(folder / CURVE, curve)
         if point["safe_score"] > best:
             team([cma.mean], make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import fcntl
 import json
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.files import read_json, remove_unfinished, write_json
+from posse_baselines.files import read_json, remove_unfinished, replacing, write_json
 from posse_training.errors import RunFolderError
 
 _LOCK: Final = "lock"
@@ -82,3 +83,11 @@ def hold_settings(
     """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
     check_held(path, settings, free, results)
     write_json(path, settings)
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write a table of one row or more, with the keys of the first as its head."""
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)

@@ -5,7 +5,6 @@ Everything is kept in the folder, so that the same command resumes a league that
 
 from __future__ import annotations
 
-import csv
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -19,14 +18,14 @@ from rich.table import Table
 
 from posse import get_scenario
 from posse_baselines.fields import number
-from posse_baselines.files import read_json, replacing, write_json
+from posse_baselines.files import read_json, write_json
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.registry import is_code
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import hold_settings, locked
+from posse_training.files import hold_settings, locked, write_csv
 from posse_training.options import Changes, Pairs
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, TrainSettings
@@ -285,13 +284,13 @@ def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
 def write_results(found: League) -> None:
     """Write matrix and summary to the league's folder."""
     folder = found.settings.path
-    with replacing(folder / "matrix.csv") as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
-        for pair, cell in found.cells.items():
-            score = cell["score"]
-            values = [score.value, score.low, score.high, cell["safe_score"].value, cell["contact_free"].value]
-            writer.writerow([*pair, *(f"{v:.4f}" for v in values), score.count])
+    rows = []
+    for (team, target), cell in found.cells.items():
+        score, other = cell["score"], {name: cell[name].value for name in ("safe_score", "contact_free")}
+        values = {"score": score.value, "low": score.low, "high": score.high, **other}
+        texts = {name: f"{value:.4f}" for name, value in values.items()}
+        rows.append({"team": team, "target": target, **texts, "episodes": score.count})
+    write_csv(folder / "matrix.csv", rows)
     summary = {
         "settings": found.settings.to_dict(),
         "cells": [

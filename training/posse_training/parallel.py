@@ -10,6 +10,7 @@ import contextlib
 import faulthandler
 import hashlib
 import io
+import operator
 import os
 import pickle
 import pickletools
@@ -180,15 +181,14 @@ def _work(function: Callable[..., Any], expected: str, *arguments: Any) -> Any:
 class Job(NamedTuple):
     """Work whose shards can be done anywhere, in any order."""
 
-    function: Callable[..., Arrays]
-    """``function(*arguments, shard)`` returns the arrays of a shard."""
-    arguments: tuple[Any, ...]
+    play: Callable[[range], Arrays]
+    """Returns the arrays of a shard."""
     shards: Sequence[range]
 
     @property
     def folder(self) -> Path:
         """Folder of finished shards; its name is a digest of all that their arrays depend on."""
-        call = cloudpickle.dumps((self.function, self.arguments))
+        call = cloudpickle.dumps(self.play)
         digest = hashlib.sha256(call + installed().encode())
         texts = {text for _, text, _ in pickletools.genops(call) if isinstance(text, str)}
         modules = {text.partition(":")[0] for text in texts if text in sys.modules or is_code(text)}
@@ -216,9 +216,9 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
             for _ in parts[-1]:
                 done()
         calls = [(k, shard) for k, job in enumerate(jobs) for shard in job.shards if shard not in parts[k]]
-        sent = [cluster.put((job.function, job.arguments)) for job in jobs]  # to each node once, not with each shard
+        sent = [cluster.put(job.play) for job in jobs]  # to each node once, not with each shard
         failed: dict[int, Exception] = {}
-        for call, result in on_ray(_play, [(sent[k], shard) for k, shard in calls]):
+        for call, result in on_ray(operator.call, [(sent[k], shard) for k, shard in calls]):
             k, shard = calls[call]
             if isinstance(result, ClusterError):
                 raise result
@@ -236,8 +236,3 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
         shutil.rmtree(folder, ignore_errors=True)
     with contextlib.suppress(OSError):  # others are in it
         os.removedirs(WORK)
-
-
-def _play(call: tuple[Callable[..., Arrays], tuple[Any, ...]], shard: range) -> Arrays:
-    function, arguments = call
-    return function(*arguments, shard)

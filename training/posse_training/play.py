@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
@@ -49,8 +49,10 @@ def main(arguments: Sequence[str]) -> None:
     if which.out.suffix.lower() not in (".html", ".htm"):
         raise SettingsError(f"--out {which.out} must end in .html or .htm")
     scenario = get_scenario(which.scenario, **which.overrides)
-    robot = robot_of(which.robot, scenario.num_trackers)
-    rounds, page = play(load(which.policy), scenario, robot, which.size, **which.place)
+    robots = [*(f"tracker_{k}" for k in range(scenario.num_trackers)), "target"]
+    if which.robot not in robots:
+        raise SettingsError(f"--as {which.robot} is no robot; there are: {', '.join(robots)}")
+    rounds, page = play(load(which.policy), scenario, robots.index(which.robot), which.size, **which.place)
     if rounds:
         print(f"{len(rounds)} rounds, best {max(rounds):.0f} points")
     if page is None:
@@ -73,23 +75,6 @@ def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, st
         ) from error
     assert renderer.window is not None
     return renderer, renderer.window
-
-
-def robot_of(name: str, num_trackers: int) -> int:
-    """Return the number of the robot with a name: ``"target"``, or ``"tracker_2"``."""
-    names = [*(f"tracker_{k}" for k in range(num_trackers)), "target"]
-    if name not in names:
-        raise SettingsError(f"--as {name} is no robot; there are: {', '.join(names)}")
-    return names.index(name)
-
-
-def steer(speed: float, held: Collection[str], seconds: float) -> tuple[float, float]:
-    """Return speed and turn, actions in [-1, 1], after arrow keys were held for some time.
-
-    The speed stays when no key is held; the turn ends with its key.
-    """
-    change = ("up" in held) - ("down" in held)
-    return min(max(speed + change * _CHANGE * seconds, -1.0), 1.0), float(("left" in held) - ("right" in held))
 
 
 def play(
@@ -148,7 +133,10 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
     scores: list[float] = []
     renderer.draw(batch, colours=colours)
     while renderer.window and not (recorder.over.all() or "n" in window.pressed):
-        speed, turn = steer(speed, window.held(*_ARROWS), scenario.control_step)
+        held = window.held(*_ARROWS)
+        change = ("up" in held) - ("down" in held)
+        speed = min(max(speed + change * _CHANGE * scenario.control_step, -1.0), 1.0)  # stays when no key is held
+        turn = ("left" in held) - ("right" in held)
         actions = np.zeros(batch.action_shape, np.float32)
         actions[:, :n], memory = policy.act(np.ascontiguousarray(observations[:, :n]), memory)
         actions[0, robot, :2] = speed, turn

@@ -1,5 +1,6 @@
 """What results on a cluster depend on, what is refused, and two nodes of Ray."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     """Another policy, or other code of it, never resumes from the shards of the first."""
 
     def folder(policy: Any) -> Path:
-        return Job(dict, (policy,), cut(9, 3)).folder
+        return Job(partial(dict, policy), cut(9, 3)).folder
 
     slow, fast = (from_function(lambda o: 1.0 * o[..., :2]), from_function(lambda o: 2.0 * o[..., :2]))
     mine = tmp_path / "team_of_mine.py"

@@ -13,7 +13,7 @@ import posse
 from posse_baselines import from_function, load, play
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
-from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds, share
+from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
@@ -88,13 +88,6 @@ def test_episodes_in_which_it_never_happened_do_not_count() -> None:
 def test_the_interquartile_mean_ignores_both_tails() -> None:
     values = np.concatenate([np.full(50, 0.5), np.full(10, 1e6), np.full(10, -1e6)])
     assert over_seeds(values, middle_mean).value == 0.5
-
-
-def test_a_share_has_wilsons_interval() -> None:
-    estimate = share([True] * 990 + [False] * 10)
-    wanted = stats.binomtest(990, 1000).proportion_ci(method="wilson")
-    assert (estimate.low, estimate.high) == pytest.approx((wanted.low, wanted.high))
-    assert share([True] * 20).high == 1.0
 
 
 class TestTrainingSeeds:

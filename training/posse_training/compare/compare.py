@@ -12,6 +12,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -31,6 +32,7 @@ from posse_training.evaluation.evaluation import (
     Evaluation,
     evaluate,
     gathered_results,
+    guarded,
     played_errors,
     prepare,
     progress_bar,
@@ -39,9 +41,8 @@ from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import check_new
 from posse_training.options import Changes, Ray, words_of
-from posse_training.parallel import apart
 from posse_training.provenance import commit
-from posse_training.replay import Replay, join, record, write_replay
+from posse_training.replay import join, record, write_replay
 
 SUMMARY: Final = "summary.json"
 REPORT: Final = "report.html"
@@ -264,14 +265,13 @@ class Comparison:
             found = self.played.get((scenario.name, contender.label, k))
             if isinstance(found, Exception):
                 raise found
-            yield found or self._done(_evaluate, policy, self.place, scenario, self.episodes(contender))
+            episodes = self.episodes(contender)
+            play = partial(evaluate, policy, scenario, episodes, progress=False, **self.place)
+            yield found or guarded(self._limit(policy), play)
 
-    def _done(self, function: Callable[..., Any], policy: Policy | str, *arguments: Any) -> Any:
-        """Return what a function does with a policy; with code in a process of its own."""
-        is_code = isinstance(policy, str)
-        return (
-            apart(self.settings.time_limit, function, policy, *arguments) if is_code else function(policy, *arguments)
-        )
+    def _limit(self, policy: Policy | str) -> float | None:
+        """Return the time limit of code, which plays in a process of its own."""
+        return self.settings.time_limit if isinstance(policy, str) else None
 
     def _stem(self, wanted: str) -> str:
         """Return a name of letters, digits and ``._-`` that no other file has, also where case is ignored."""
@@ -305,25 +305,16 @@ class Comparison:
         given, s = next(each for each in self.scenarios if each.name == one.scenario), self.settings
         scenario, _ = next(blocks(given, range(one.world, one.world + 1), s.seed, s.split))
         try:
-            replays = [
-                self._done(_record, by_label[label].policies[seed], self.place, label, scenario, one.world)
-                for label, seed in ((self.reference, 0), (one.policy, one.seed))
-            ]
+            replays = []
+            for label, seed in ((self.reference, 0), (one.policy, one.seed)):
+                policy = by_label[label].policies[seed]
+                play = partial(record, [(label, policy)], scenario, world=one.world, observations=False, **self.place)
+                replays.append(guarded(self._limit(policy), play))
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
             write_replay(join(replays), self.folder / name)
         except (PolicyError, PlayError, SettingsError) as error:
             return "", f"no replay: {error}"
         return name, ""
-
-
-def _evaluate(policy: str | Policy, place: dict[str, Any], scenario: Scenario | Family, episodes: int) -> Results:
-    with played_errors():
-        return evaluate(policy, scenario, episodes, progress=False, **place)
-
-
-def _record(policy: str | Policy, place: dict[str, Any], label: str, scenario: Scenario, world: int) -> Replay:
-    with played_errors():
-        return record([(label, policy)], scenario, world=world, observations=False, **place)
 
 
 def _facts(settings: Settings) -> str:

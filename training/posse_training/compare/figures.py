@@ -87,7 +87,8 @@ def profile(plays: Found, looks: Looks) -> Figure:
         axis.set_title(_versioned(plays, name), fontweight="bold")
         curves = [(p, plays[name, p]["safe_score"]) for p in policies if (name, p) in plays]
         for policy, values in [*curves, (BOUND, _bound(plays, name)["bound"])]:
-            _steps(axis, at, _at_least(values, at), looks, policy)
+            reached = (values.reshape(-1, 1) >= at).mean(axis=0)
+            _steps(axis, at, reached, looks, policy)
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
     for axis in axes[len(names) :]:
         axis.set_visible(False)
@@ -176,9 +177,3 @@ def _steps(axis: Any, x: Any, y: Any, looks: Looks, policy: str) -> None:
     look, k = looks[policy].point, list(looks).index(policy)
     every = max(1, len(x) // 6)
     axis.step(x, y, where="post", **look, markevery=(k * every // len(looks), every))
-
-
-def _at_least(values: Any, scores: Any) -> Any:
-    """Return the share of values (S, W) that are at least each score."""
-    ordered = np.sort(values.reshape(-1))
-    return 1 - np.searchsorted(ordered, scores, side="left") / len(ordered)

@@ -140,7 +140,7 @@ def gathered_results(
     What is finished is kept until the context ends without an exception; see
     :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
     """
-    jobs = [Job(_play_on_worker, (one.match, one.time_limit), one.shards) for one in evaluations]
+    jobs = [Job(partial(_play_on_worker, one.match, one.time_limit), one.shards) for one in evaluations]
     with gathered(jobs, ray, done) as found:
         both = zip(evaluations, found, strict=True)
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
@@ -148,15 +148,17 @@ def gathered_results(
 
 def _play_on_worker(match: Match, time_limit: float | None, shard: range) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
-    if isinstance(match.policy, str) and is_code(match.policy) and time_limit is not None:
-        found: Arrays = apart(time_limit, _play_here, match, shard)
-        return found
-    return _play_here(match, shard)
+    is_apart = isinstance(match.policy, str) and is_code(match.policy)
+    found: Arrays = guarded(time_limit if is_apart else None, partial(play_shard, match, shard, num_threads=1))
+    return found
 
 
-def _play_here(match: Match, shard: range) -> Arrays:
+def guarded(limit: float | None, play: Callable[[], Any]) -> Any:
+    """Return what a call gives, with :func:`played_errors`; with a time limit, s, in a process of its own."""
+    if limit is not None:
+        return apart(limit, guarded, None, play)
     with played_errors():
-        return play_shard(match, shard, num_threads=1)
+        return play()
 
 
 @contextmanager

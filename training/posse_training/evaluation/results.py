@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,8 +12,9 @@ import numpy.typing as npt
 
 from posse import Family, Scenario
 from posse.scenarios.family import BLOCK
-from posse_baselines.files import write_atomically, write_json
+from posse_baselines.files import write_json
 from posse_training.evaluation.statistics import Estimate, mean
+from posse_training.files import write_csv
 
 Column = npt.NDArray[np.float64]
 
@@ -91,16 +90,6 @@ class Results:
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = self.rows()
-        text = io.StringIO(newline="")
-        writer = csv.DictWriter(text, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-        write_atomically(path, text.getvalue().encode())
-        settings = {
-            "policy": self.policy,
-            **({} if self.target is None else {"target": self.target}),
-            "seed": self.seed,
-            "split": self.split,
-            "scenario": self.scenario.to_dict(),
-        }
-        write_json(path.with_suffix(".json"), settings)
+        write_csv(path, rows)
+        settings = {name: rows[0][name] for name in ("policy", "target", "seed", "split") if name in rows[0]}
+        write_json(path.with_suffix(".json"), {**settings, "scenario": self.scenario.to_dict()})

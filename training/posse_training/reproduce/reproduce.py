@@ -5,7 +5,6 @@ The paper does not state scale, gains and starts; docs/paper.md lists those chos
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from rich.console import Console
 import posse
 from posse_baselines import Trajectory
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.files import write_atomically
+from posse_baselines.files import write_json
 from posse_training.errors import SettingsError
 from posse_training.reproduce import runs
 from posse_training.reproduce.figures import curves, frames, leader_loss, tracks
@@ -93,8 +92,7 @@ def reproduce(out: Path = Path("runs/paper"), starts: int = 200, seed: int = 7) 
         save(tracks(seed), out, "tracks")
         save(leader_loss("pngl-l-phi", starts, seed), out, "leader-loss")
     stated = {"seed": seed, "split": SPLIT, "tolerance": TOLERANCE}
-    text = json.dumps({**stated, "policies": rows}, indent=2)
-    write_atomically(out / "settling.json", f"{text}\n".encode())
+    write_json(out / "settling.json", {**stated, "policies": rows})
     lines = [
         f"settling time, s: finally within {TOLERANCE:g} m and {SPEED_TOLERANCE:g} m/s;",
         f"{starts:,} starts of {game}",

@@ -16,7 +16,6 @@ from posse_training.train.settings import TrainSettings
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
-    from torch import nn
 
     from posse_training.train.vec_env import TeamVecEnv
 
@@ -31,30 +30,26 @@ class Algorithm:
 
     Attributes:
         make: Returns an untrained model of stable-baselines3.
-        actor: Returns the layers of a model from normalised input to action, for the exported policy.
+        actor: Modules of the model's policy with its layers from normalised input to action, for the exported policy.
         bound: How the exported policy bounds the last layer's output: ``"clip"`` or ``"tanh"``.
         on_policy: Whether it learns from its latest rollout only.
         reads_state: Whether its observations end with the state of the world, for its value function.
     """
 
     make: Callable[[TrainSettings, TeamVecEnv], BaseAlgorithm]
-    actor: Callable[[Any], list[nn.Module]]
+    actor: tuple[str, ...]
     bound: str
     on_policy: bool = False
     reads_state: bool = False
 
 
-def _ppo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
-    return _any_ppo(s, env, "MlpPolicy")
-
-
 def _mappo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     from posse_training.train.networks import CentralizedCriticPolicy
 
-    return _any_ppo(s, env, CentralizedCriticPolicy, private_size=env.encoding.size)
+    return _ppo(s, env, CentralizedCriticPolicy, private_size=env.encoding.size)
 
 
-def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, **network: Any) -> BaseAlgorithm:
+def _ppo(s: TrainSettings, env: TeamVecEnv, policy: Any = "MlpPolicy", **network: Any) -> BaseAlgorithm:
     from stable_baselines3 import PPO
 
     return PPO(
@@ -119,29 +114,12 @@ def _network(s: TrainSettings, **further: Any) -> dict[str, Any]:
     }
 
 
-def _ppo_actor(policy: Any) -> list[nn.Module]:
-    return [*_flat(policy.mlp_extractor.policy_net), policy.action_net]
-
-
-def _sac_actor(policy: Any) -> list[nn.Module]:
-    return [*_flat(policy.actor.latent_pi), policy.actor.mu]
-
-
-def _td3_actor(policy: Any) -> list[nn.Module]:
-    return _flat(policy.actor.mu)[:-1]  # the last one is the tangent that bounds the output
-
-
-def _flat(module: nn.Module) -> list[nn.Module]:
-    from torch import nn
-
-    return [m for m in module.modules() if not isinstance(m, nn.Sequential)]
-
-
+_PPO_ACTOR: Final = ("mlp_extractor.policy_net", "action_net")
 ALGORITHMS: Final = {
-    "ppo": Algorithm(_ppo, _ppo_actor, "clip", on_policy=True),
-    "mappo": Algorithm(_mappo, _ppo_actor, "clip", on_policy=True, reads_state=True),
-    "sac": Algorithm(_sac, _sac_actor, "tanh"),
-    "td3": Algorithm(_td3, _td3_actor, "tanh"),
+    "ppo": Algorithm(_ppo, _PPO_ACTOR, "clip", on_policy=True),
+    "mappo": Algorithm(_mappo, _PPO_ACTOR, "clip", on_policy=True, reads_state=True),
+    "sac": Algorithm(_sac, ("actor.latent_pi", "actor.mu"), "tanh"),
+    "td3": Algorithm(_td3, ("actor.mu",), "tanh"),
 }
 """By name; a new algorithm is an entry here, and the function that makes it."""
 EVOLUTION: Final = "cmaes"

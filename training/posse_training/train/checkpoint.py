@@ -6,9 +6,8 @@ new one replaces the last one atomically, so that a whole one exists whenever th
 
 from __future__ import annotations
 
-import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +17,7 @@ import numpy.typing as npt
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from posse_baselines.files import replacing, write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.errors import RunFolderError
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import Point
@@ -39,14 +38,6 @@ class Progress:
     rollouts: int = 0
     seconds: float = 0.0
     curve: list[Point] = field(default_factory=list)
-
-
-def write_curve(path: Path, curve: Sequence[Point]) -> None:
-    """Write a learning curve of one point or more."""
-    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, curve[0])
-        writer.writeheader()
-        writer.writerows(curve)
 
 
 def write_checkpoint(folder: Path, state: State) -> None:

@@ -25,7 +25,8 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
     ``predict(..., deterministic=True)`` to rounding. A :class:`Normaliser` stands before its networks.
     """
     algorithm = ALGORITHMS[settings.algorithm]
-    layers = [module for module in algorithm.actor(model.policy) if isinstance(module, nn.Linear)]
+    modules = [module for name in algorithm.actor for module in model.policy.get_submodule(name).modules()]
+    layers = [module for module in modules if isinstance(module, nn.Linear)]
     inputs = layers[0].in_features  # behind them, a critic reads the state of the world
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     network = Network(

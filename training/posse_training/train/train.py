@@ -17,7 +17,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from posse_baselines import load
 from posse_training.errors import DivergedError, RunFolderError, SettingsError
 from posse_training.evolution import check_adviser, evolve
-from posse_training.files import check_held, hold_settings, locked
+from posse_training.files import check_held, hold_settings, locked, write_csv
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
@@ -206,7 +206,7 @@ class Run(BaseCallback):
         point |= validate(self.settings, self._policy())
         best = max((earlier["safe_score"] for earlier in self.at.curve), default=-1.0)
         self.at.curve.append(point)
-        checkpoint.write_curve(self.folder / CURVE, self.at.curve)
+        write_csv(self.folder / CURVE, self.at.curve)
         if point["safe_score"] > best:
             self._policy().save(self.folder / BEST)
         for name in ("safe_score", "score", "contact_free"):

@@ -12,11 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from posse import Batch, Scenario
-from posse.numeric import FloatArray, Records, kernel
+from posse.numeric import ONE, ZERO, FloatArray, Records, kernel
 from posse.rules import NEVER, config_record, in_frame
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 
 TARGET_SIZE: Final = 6
 TRACKER_SIZE: Final = 11
@@ -32,7 +29,7 @@ def _write(config: Records, world: Records, tracker: Records, obstacle: Records,
         for i in range(n):
             o = out[e * n + i]
             for k in range(len(o)):
-                o[k] = _ZERO
+                o[k] = ZERO
             o[0] = w.speed
             o[1] = w.turn_rate
             o[2], o[3] = in_frame(w.heading_cos, w.heading_sin, w.frame_cos, w.frame_sin)
@@ -45,8 +42,8 @@ def _write(config: Records, world: Records, tracker: Records, obstacle: Records,
                 o[k + 2], o[k + 3] = in_frame(t.heading_cos, t.heading_sin, w.frame_cos, w.frame_sin)
                 o[k + 4] = t.speed
                 o[k + 5] = t.turn_rate
-                o[k + 6] = _ONE if t.broken_at == NEVER else _ZERO
-                o[k + 7] = _ONE if t.slot >= 0 else _ZERO
+                o[k + 6] = ONE if t.broken_at == NEVER else ZERO
+                o[k + 7] = ONE if t.slot >= 0 else ZERO
                 o[k + 8] = t.slot_distance
                 o[k + 9] = np.float32(t.sees)
                 o[k + 10] = np.float32(t.touching)

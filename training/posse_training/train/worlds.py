@@ -63,7 +63,21 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
 
 def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVecEnv:
     """Return the training worlds, of the split ``"train"``, stepped by so many threads."""
-    batches = _make_batches(settings, num_threads)
+    batches: list[posse.Batch] = []
+    for pair, worlds in divided(settings):
+        scenario = pair.scenario
+        if settings.end_on_contact:
+            scenario = scenario.replace(terminate_on_contact=True)
+        batches += posse.batches(
+            scenario,
+            len(worlds),
+            scenarios=settings.family_scenarios,
+            seed=settings.seed,
+            first_world=worlds.start,
+            autoreset="disabled",
+            num_threads=num_threads,
+            **pair.inside,
+        )
     layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
     if settings.side == "target":  # it hears no messages
         layout = ObservationLayout(layout.scenario.replace(message_size=0))
@@ -91,23 +105,3 @@ def divided(settings: TrainSettings) -> list[tuple[Pairing, range]]:
                 f"needs {least}; raise it" + ", or lower family_scenarios" * drawn
             )
     return parts
-
-
-def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
-    """Return batches of worlds, divided among the pairings."""
-    batches: list[posse.Batch] = []
-    for pair, worlds in divided(settings):
-        scenario = pair.scenario
-        if settings.end_on_contact:
-            scenario = scenario.replace(terminate_on_contact=True)
-        batches += posse.batches(
-            scenario,
-            len(worlds),
-            scenarios=settings.family_scenarios,
-            seed=settings.seed,
-            first_world=worlds.start,
-            autoreset="disabled",
-            num_threads=num_threads,
-            **pair.inside,
-        )
-    return batches
