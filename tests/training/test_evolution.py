@@ -16,7 +16,6 @@ from posse_training import evolution
 from posse_training.errors import RunFolderError
 from posse_training.evaluation import evaluate
 from posse_training.evolution import Candidates
-from posse_training.train import default_settings
 from posse_training.train.train import train
 
 EVOLVED: dict[str, Any] = {
@@ -76,12 +75,6 @@ def test_a_mirrored_world_is_played_as_the_world(tmp_path: Path, how: dict[str, 
     there, mirrored = actions[policy.name, 1.0], actions[policy.name, -1.0]
     assert np.abs(there - actions[begun.name, 1.0]).max() > 0.01, "it has learned"
     np.testing.assert_allclose(mirrored, there * (1.0, -1.0), rtol=1e-3, atol=1e-3)
-
-
-def test_its_preset_says_whether_it_corrects_the_tuned_script() -> None:
-    found = [default_settings("robots", "cmaes", preset=preset) for preset in ("residual", "nothing")]
-    assert [(s.advise, s.safeguard) for s in found] == [("ddcs-tuned", False), (None, True)]
-    assert found[0] == default_settings("robots", preset="residual")
 
 
 def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:

@@ -9,12 +9,10 @@ from typing import Any
 import pytest
 import tyro
 from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
-from tests.support.runs import TARGET, quiet, small
+from tests.support.runs import quiet, small
 
-from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
-from posse_training.errors import SettingsError
 from posse_training.leaderboard import SEED
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.train import train
@@ -61,20 +59,6 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], 
     assert str(runs[0].parent) not in json.dumps(shipped.card)
 
 
-def test_runs_that_are_not_of_one_training_are_refused(runs: tuple[Path, ...], tmp_path: Path) -> None:
-    other = tmp_path / "other"
-    train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=quiet())
-    for folders, name, message in (
-        ((runs[0], runs[0]), "learned-x", "must have different training seeds"),
-        ((runs[0], other), "learned-x", "differ in hidden"),
-        (runs, "smart", "must begin with learned- or corrected-"),
-        ((), "learned-x", "no run folders given"),
-    ):
-        with pytest.raises(SettingsError, match=message):
-            ship(Settings(folders, name, worlds=2, out=tmp_path))
-    assert not list(tmp_path.glob("*.safetensors"))
-
-
 def test_the_command_on_record_gives_the_settings_again() -> None:
     for settings in (
         replace(
@@ -95,22 +79,3 @@ def test_the_command_on_record_gives_the_settings_again() -> None:
         words = shlex.split(command_of(settings))[2:]
         default = default_settings(settings.scenario, settings.algorithm)
         assert tyro.cli(TrainSettings, default=default, args=words) == settings
-
-
-def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = tmp_path / "run"
-    changes = {**TARGET, "team": "idle", "steps": 80, "evaluate_every": 80, "reward_weights": {"team": -1.0}}
-    settings = small(run, **changes)
-    train(settings, console=quiet())
-    asked = Settings((run,), "mine", worlds=4, out=tmp_path / "out")
-    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", 0.1))
-    with pytest.raises(SettingsError, match=r"costs idle .* more than 'smart': at least 0.1"):
-        ship(asked)
-    assert not (tmp_path / "out").exists()
-    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", -1.0))
-    target = load_target(ship(asked))
-    card = target.policy.card  # type: ignore[union-attr]
-    assert target.name == "mine"
-    assert str(tmp_path) not in str(card)
-    assert card["comparison"]["cost"]["count"] == 4
-    assert card["check"]["score"] >= 0

@@ -122,15 +122,6 @@ def test_a_choice_of_autoreset_or_of_a_team_is_refused() -> None:
         PosseEnv("constant", WORLDS, team_policy=load("pursuit"))
 
 
-def test_a_seed_outlives_a_refused_reset() -> None:
-    env = PosseEnv("smart", WORLDS)
-    first = env.reset(seed=7)["agents", "observation"].clone()
-    env.set_seed(7)
-    with pytest.raises(ValueError, match="unknown option 'foo'"):
-        env.reset(options={"foo": 1})
-    assert torch.equal(env.reset()["agents", "observation"], first)
-
-
 def test_a_step_of_some_worlds_alone_is_refused() -> None:
     env = PosseEnv("constant", 64, terminate_on_contact=True, start_distance=(1.0, 2.5), **SHORT)
     with pytest.raises(NotImplementedError, match="break_when_any_done=False"):
