@@ -27,9 +27,9 @@ from posse.signals.layout import ObservationLayout
 __version__ = "0.1.0"
 
 METRICS: Final[tuple[metric, ...]] = declarations.METRICS.of()
-"""Every built-in metric, in the order in which they are reported."""
+"""Every built-in metric with ``name``, ``unit`` and ``meaning``, in the order in which they are reported."""
 REWARD_TERMS: Final[tuple[reward_term, ...]] = declarations.REWARD_TERMS.of()
-"""The built-in reward terms, in the order in which they are reported."""
+"""The built-in reward terms with ``name``, ``unit`` and ``meaning``, in the order in which they are reported."""
 
 
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
