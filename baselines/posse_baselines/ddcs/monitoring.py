@@ -12,6 +12,7 @@ from typing import Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, pair, since
+from posse_baselines.ddcs.settings import TASKS
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, vector, wrap
 from posse_baselines.laws.guidance import UNLIMITED
 
@@ -40,9 +41,10 @@ def encode(value: int, part: float = 0.0) -> float:
 
 
 @compiled
-def decode(number: float) -> int:
-    """Inverse of :func:`encode`, defined for any number."""
-    return round(number / _MESSAGE_STEP) - 1
+def decode(number: float, count: int) -> int:
+    """Inverse of :func:`encode` for whole numbers below ``count``; of any other number, -1."""
+    value = round(number / _MESSAGE_STEP) - 1
+    return value if 0 <= value < count else -1
 
 
 @compiled
@@ -222,9 +224,10 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         mate.heading, mate.velocity = heading, scaled(heading, row[at.neighbour_speed + k])
         mate.turn = row[at.neighbour_turn_rate + k]
         if at.message_size >= MESSAGE_SIZE:
-            m = at.neighbour_message + k
-            mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
-            mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
+            m, n = at.neighbour_message + k, len(mates)
+            mate.task, mate.leader = decode(row[m], len(TASKS)), decode(row[m + 1], n)
+            mate.term, mate.pulse = decode(row[m + 2], COUNT), decode(row[m + 3], COUNT)
+            mate.slot = decode(row[m + 4], n)
             if team.world.drifts != 0:
                 align(team, me, mate, row, m)
 

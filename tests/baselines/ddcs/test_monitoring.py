@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import load, rollout
+from posse_baselines import begin, load, rollout
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
@@ -25,6 +25,14 @@ def test_late_fixes_are_extrapolated_to_the_present() -> None:
     fixed = np.abs(position + v["target_range"] * bearing * heading - target)[late][counts[late]]
     assert fixed.size > 100
     assert estimated.mean() < 0.3 * fixed.mean()
+
+
+def test_claims_that_name_no_robot_or_slot_of_the_team_are_none() -> None:
+    policy, batch = load("pngl-l-phi"), posse.batch(message_size=5)
+    observations = batch.reset()
+    batch.layout.views(observations)["neighbour_message"][...] = 0.6
+    _, memory = policy.act(observations, begin(policy, batch))
+    assert memory.mates["leader"].max() == memory.mates["slot"].max() == -1
 
 
 def test_noise_of_the_headings_is_filtered() -> None:
