@@ -91,6 +91,7 @@ class Search(OwnArrays):
         self._later = self.batch.copies(1, seed=_SEED, into=self._later)
         unread = actions_of_target(self._later)
         for _ in range(delay):
+            self._later.arrays.world["over"] = 0  # one that has ended goes on, and draws no start
             self._later.step(unread)
         return self._later
 
@@ -143,6 +144,7 @@ def play_ahead(teams: Teams, copies: Batch, steps: int) -> npt.NDArray[np.float6
         if s.command_delay:  # in the place of the command that is due
             due = world["step"] % s.command_delay
             copies.arrays.command[np.arange(len(world)), due] = actions[:, : s.num_trackers, :2]
+        world["over"] = 0  # one that has ended goes on, uncounted, and draws no start
         _, _, terminated, truncated, infos = copies.step(actions)
         touched = going & (world[_CONTACTS[0]] + world[_CONTACTS[1]] + world[_CONTACTS[2]] > 0)
         going &= ~touched

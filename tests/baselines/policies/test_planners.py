@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import PolicyError, batch_for, begin, load, play, rollout
+from posse_baselines import PolicyError, batch_for, begin, load, load_target, play, rollout
 from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import Planner, PlannerSettings
 
@@ -61,15 +61,11 @@ def test_it_does_not_know_the_faults_to_come() -> None:
 
 
 def test_it_plays_beside_a_target_that_is_an_agent() -> None:
-    batch = posse.batch("smart", 2, target_motion="agent")
-    planner = Planner(QUICK)
-    observations = batch.reset()[:, :5]
-    memory = begin(planner, batch)
-    for _ in range(5):
-        actions, memory = planner.act(observations, memory)
-        assert actions.shape == (2, 5, 2)
-        target = np.full((2, 1, 2), 0.5, np.float32)
-        observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
+    """Where copies end before their worlds, and at this distance no start can be drawn for them."""
+    ends: dict[str, Any] = {"horizon": 6, "command_delay": 4, "start_distance": (0.31, 0.31)}
+    batch = posse.batch("smart", 2, target_policy=load_target("evader").policy, **ends)
+    poses = {"tracker_pose": [(i, 3.0, 0.0) for i in range(5)], "target_pose": (0.0, 0.0, 0.0)}
+    rollout(batch, Planner(QUICK), steps=5, options=poses)
 
 
 def test_the_planner_reads_only_the_batch_it_watches() -> None:
