@@ -16,6 +16,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, Records, record_type
 from posse.rules import DART_TURN, NEVER, PATIENCE
+from posse.scenarios.scenario import FARTHEST
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
 from posse_baselines.ddcs.settings import Settings
@@ -63,9 +64,10 @@ class _Told(NamedTuple):
 
 def believed(scenario: Scenario) -> Scenario:
     """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
-    near, far = scenario.start_distance
+    near, far = scenario.start_distance  # no start is played: wider, as far as there is room
+    far += min(2 * scenario.num_trackers * scenario.robot_radius, 0.99 * (FARTHEST - scenario.position_bound))
     return scenario.replace(
-        start_distance=(near, far + 2 * scenario.num_trackers * scenario.robot_radius),  # no start is played
+        start_distance=(near, min(far, 2 * FARTHEST)),
         sensor="range-bearing",
         sonar_beams=0,
         num_neighbours=0,

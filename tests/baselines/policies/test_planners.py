@@ -7,7 +7,7 @@ import pytest
 
 import posse
 from posse_baselines import PolicyError, batch_for, begin, load, load_target, play, rollout
-from posse_baselines.policies.belief_planner import BeliefPlanner
+from posse_baselines.policies.belief_planner import BeliefPlanner, believed
 from posse_baselines.policies.planner import Planner, PlannerSettings
 
 QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
@@ -127,9 +127,11 @@ def test_a_late_fix_is_stepped_to_the_present(motion: str) -> None:
 
 
 def test_noisy_fixes_are_filtered() -> None:
-    noise: dict[str, Any] = {"range_noise": 0.06, "bearing_noise": 0.06, "start_distance": (2.0, 4.0)}
+    """In the longest episodes that are allowed on the open plane."""
+    noise: dict[str, Any] = {"range_noise": 0.06, "bearing_noise": 0.06, "start_distance": (2.0, 4.0), "horizon": 4860}
     policy = BeliefPlanner(QUICK_BELIEF)
     batch = posse.batch("constant", 8, message_size=policy.message_size, **noise)
     played = rollout(batch, policy, ["annotations", "target_pose"], steps=30)
     away = np.abs(played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]).max(axis=-1)
     assert np.median(away[10:]) < 0.3 * np.median(away[0])
+    believed(batch.scenario.replace(arena=990.0, start_distance=(1.0, 1000.0)))  # the widest that is allowed
