@@ -135,8 +135,9 @@ class Declaration:
                 setattr(self, attribute, self._checked(function, allowed))
         name: Any = self.name
         unit: Any = self.unit
-        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
-            raise self.error(f"invalid name {name!r}: use letters, digits, _ and -")
+        dash = " and -" if isinstance(self, target_motion | sensor) else ""  # what others are called is Python's
+        if not isinstance(name, str) or not name.replace("-", "_" if dash else "-").isidentifier():
+            raise self.error(f"invalid name {name!r}: use letters, digits, _{dash}")
         if not self.meaning.strip():
             raise self.error("its docstring, which must state its meaning, is missing")
         if not isinstance(unit, str) or not unit:

@@ -25,9 +25,8 @@ MISTAKES: Final = {
     '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
     '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
-    '@posse.target_motion("a b")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): invalid name 'a b'",
+    'def own(c, w):\n    """?"""\nown.__name__ = "a-b"\nposse.metric("1")(own)': "'a-b': use letters, digits, _$",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
-    # Names of what is declared.
     FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
     MOTION.format("", "", "pass").replace('motion="own"', 'motion="wn"'): r"unknown target_motion 'wn' .did",
     # Options.
