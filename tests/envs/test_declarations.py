@@ -16,6 +16,11 @@ MOTION = '@posse.target_motion("own"{})\ndef own(c, w{}):\n    """Own."""\n    {
 SENSOR = (
     'def m({}):\n    return dx, dy\n@posse.sensor({})\ndef own(c, w, t, dx, dy):\n    """Own."""\n    return True\n'
 )
+AGAIN = (
+    MOTION.format(', memory=["was"]', "", "w.x / 0.0").replace("posse.batch", "old = posse.batch")
+    + "\nold.reset()\nsaved = old.save()\n"
+    + MOTION.format("", "", "w.x / 0.0").replace("posse.batch", "new = posse.batch")
+)
 
 MISTAKES: Final = {
     # What is declared.
@@ -25,10 +30,9 @@ MISTAKES: Final = {
     '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
     '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
-    'def own(c, w):\n    """?"""\nown.__name__ = "a-b"\nposse.metric("1")(own)': "'a-b': use letters, digits, _$",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
+    'def own(c, w):\n    """?"""\nown.__name__ = "a-b"\nposse.metric("1")(own)': "'a-b': use letters, digits, _$",
     FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
-    MOTION.format("", "", "pass").replace('motion="own"', 'motion="wn"'): r"unknown target_motion 'wn' .did",
     # Options.
     **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
        for size in ("0", "2.0", "1000000000", "True")},
@@ -45,22 +49,25 @@ MISTAKES: Final = {
     SENSOR.format("c", '"own", measure=m'): r"sensor m \(main.py:1\): its parameters are \(c\), not \(c, w, number, dx",
     SENSOR.format("c, w, number, dx, dy", '"own", measure=m').replace("dx, dy\n@", "dx / 0.0, dy\n@")
     + 'posse.batch(sensor="own").reset()': "an observation is not finite: .*sensor='own' measures",
+    **{f"{AGAIN}\n{call}": "declarations have changed since these worlds were made: make a new batch"
+       for call in ("old.copies(1)", "new.restore(saved)", "pickle.loads(pickle.dumps(old))")},
+    FIELD.format('"1", 0, 1', "c, v", "v.x").replace("posse.batch", "old = posse.batch").replace(".reset()", "\n")
+    + FIELD.format('"1", 0, 1, size=2', "c, v", "v.x, v.y").replace(".reset()", "\npickle.loads(pickle.dumps(old))"):
+        "declarations have changed",
     # What the compiler says.
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): unknown field 'sped' \(did you mean 'speed'",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"own \(main.py:1\): (.|\n)*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"It creates an array, a list or a text",
-    TERM.format("c, w, t", "return complex(t.x, t.y)"): r"it returns complex64, not a number",
     FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"it returns Lanes, not 2 numbers",
-    FIELD.format('"1", 0, 1', "c, v", "np.linalg.eigvals(v.x)"): r"eigvals",
 }  # fmt: skip
 
 ATTEMPTS = """
-import json
+import json, pickle
 import numpy as np
 import posse
 for code in {}:
     try:
-        exec(compile(code, "main.py", "exec"), dict(__name__="main", posse=posse, np=np))
+        exec(compile(code, "main.py", "exec"), dict(__name__="main", posse=posse, np=np, pickle=pickle))
         message = "nothing"
     except Exception as error:
         message = type(error).__name__ + ": " + str(error)
@@ -85,7 +92,7 @@ def test_a_mistake_names_the_function_the_line_and_the_reason(code: str, message
     assert re.search(MISTAKES[code], messages[code]), messages[code]
 
 
-AGAIN = """
+RELOADED = """
 import importlib, pickle
 import numpy as np
 import posse
@@ -102,7 +109,6 @@ def made():
 old = made()
 pickled = pickle.dumps(old)
 assert value(old) == 1.0
-assert value(pickle.loads(pickled)) == 1.0
 open("steady.py", "w").write(STEADY.replace("gain(1)", "gain(2)"))
 importlib.reload(steady)
 assert value(made()) == 2.0, "a new batch uses the new declaration"
@@ -130,7 +136,7 @@ def steady(c, w, t):
 
 @pytest.mark.long
 def test_a_declaration_is_replaced_for_batches_made_or_unpickled_afterwards(tmp_path: Path) -> None:
-    code = f"STEADY = {STEADY!r}\n{AGAIN}"
+    code = f"STEADY = {STEADY!r}\n{RELOADED}"
     done = run(tmp_path, code, steady=STEADY, gains="GAIN = 1.0\n")
     assert done.stdout.endswith("done\n"), done.stderr
 
@@ -159,8 +165,6 @@ subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check
 
 
 FIELDS_AND_TERMS = """
-import pickle
-
 import numpy as np
 import posse
 import closing
@@ -206,8 +210,6 @@ for step in range(60):
     turn = abs(batch.state["tracker_turn_rate"]) / s.tracker_turn_rate
     np.testing.assert_allclose(terms["steady"][:, :4], 1 - turn, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(rewards[:, :4], (terms["slot"] + 0.5 * terms["steady"])[:, :4], rtol=1e-5, atol=1e-5)
-copy = pickle.loads(pickle.dumps(batch))
-np.testing.assert_array_equal(copy.step(actions)[0], batch.step(actions)[0])
 assert "steady" not in posse.batch("smart").term_names
 print("done")
 """
@@ -287,7 +289,6 @@ distances.append(abs(points(batch, "world")[:, None] - points(batch, "tracker"))
 np.testing.assert_allclose(metrics["target_distance"], np.mean(distances, (0, 2)), rtol=1e-5)
 assert (infos["metrics/target_distance"] == 0).all()
 infos = batch.step(np.ones(batch.action_shape))[-1]
-assert infos["metrics/target_distance"].shape == (40,)
 batch.step(np.ones(batch.action_shape))  # the next episode's start: sums begin anew
 assert (batch.state["world_target_distance_sum"] == 0).all()
 print("done")

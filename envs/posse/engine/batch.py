@@ -29,16 +29,17 @@ from posse.engine.kernels import (
     fixed_for,
     kernel_of,
 )
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.numeric.threads import threads_for
 from posse.rules.start import check_drawn
-from posse.rules.state import NEVER, WorldArrays
+from posse.rules.state import NEVER, WorldArrays, world_record
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.scenarios.setting import SPLITS, check_choice, check_count
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import check_terms
 
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
+_CHANGED: Final = "the declarations have changed since these worlds were made: make a new batch"
 # Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
 _DERIVED: Final = frozenset(("_declared", "_own_terms", "_own_rules", "_kernel", "_orders", "_fixed", "_info"))
 
@@ -138,6 +139,9 @@ class Batch(OwnArrays):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         super().__setstate__(state)
+        now, record = ObservationLayout(self.scenario), world_record(Declarations.of(self.scenario))
+        if (now.size, now.offsets, record) != (self.layout.size, self.layout.offsets, self.arrays.world.dtype):
+            raise DeclarationError(_CHANGED)
         self._prepare()
 
     # The state of the worlds.
@@ -173,7 +177,7 @@ class Batch(OwnArrays):
         """Restore a snapshot of this scenario and number of worlds, or raise ValueError; return its observations."""
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
-        self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
+        self._check_fit("a snapshot", snapshot.arrays.world, snapshot.scenario, self.num_worlds)
         self.arrays.write(snapshot.arrays)
         self._started = True
         return self.observe()
@@ -201,17 +205,11 @@ class Batch(OwnArrays):
         count, seed = check_count("count", count, 1), check_count("seed", seed, 0)
         self.check_started("copies")
         if into is None:
-            into = Batch(
-                self.scenario,
-                self.num_worlds * count,
-                seed=self.seed,
-                split=self.split,
-                num_threads=self.num_threads,
-                clip_actions=self.clip_actions,
-            )
+            own = {name: getattr(self, name) for name in ("seed", "split", "num_threads", "clip_actions")}
+            into = Batch(self.scenario, self.num_worlds * count, **own)
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
-        self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
+        self._check_fit("a batch for the copies", into.arrays.world, into.scenario, self.num_worlds * count)
         for mine, theirs in zip(self.arrays, into.arrays, strict=True):
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
@@ -220,12 +218,14 @@ class Batch(OwnArrays):
         into._started, into._over = True, count * self._over
         return into
 
-    def _check_fit(self, what: str, worlds: int, scenario: Scenario, wanted: int) -> None:
-        if scenario != self.scenario or worlds != wanted:
+    def _check_fit(self, what: str, worlds: Records, scenario: Scenario, wanted: int) -> None:
+        if scenario != self.scenario or len(worlds) != wanted:
             raise ValueError(
-                f"{what} of {worlds} worlds of {scenario.name!r} does not fit {wanted} worlds of "
+                f"{what} of {len(worlds)} worlds of {scenario.name!r} does not fit {wanted} worlds of "
                 f"{self.scenario.name!r}: scenario and number of worlds must be equal"
             )
+        if worlds.dtype != self.arrays.world.dtype:
+            raise DeclarationError(_CHANGED)
 
     # The start of episodes.
 
