@@ -228,7 +228,7 @@ _WORLD: Final = (
     # inputs of the metrics
     ("working", _I),  # number of working trackers
     ("score", _F),  # of the current step
-    ("tracker_steps", _F),  # control steps of all working trackers
+    ("tracker_steps", _I),  # control steps of all working trackers
     ("held", _I),  # consecutive steps with each working tracker in its own slot
     ("settled_at", _I),
     ("detected_at", _I),

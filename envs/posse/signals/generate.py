@@ -92,7 +92,7 @@ class _Module:
                 ),
                 "return add_noise(c, w, number, dx, dy)",
             ],
-            "clear_sums(w)": [*(f"w.{metric.sum_name} = ZERO" for metric in summed), "w.tracker_steps = ZERO"],
+            "clear_sums(w)": [*(f"w.{metric.sum_name} = ZERO" for metric in summed), "w.tracker_steps = 0"],
             "add_to_sums(c, w, trackers, slots)": self._sums(summed),
         }
         body = [
@@ -142,7 +142,7 @@ class _Module:
                 yield from (f"if c.{setting} == {k}:", f"    {statement.format(self._call(name, function))}")
 
     def _sums(self, metrics: Iterable[metric]) -> Iterator[str]:
-        loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += float32(w.working)"]
+        loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += w.working"]
         for each in metrics:
             value = self._call(f"metric_{each.name}", each.function)
             if "t" in parameters_of(each.function):

@@ -34,16 +34,18 @@ def test_the_number_of_threads_changes_nothing() -> None:
 
 
 def test_seed_split_and_episode_each_make_other_worlds() -> None:
-    starts = [
-        posse.batch("constant", 50, seed=seed, split=split).reset()
-        for seed in (0, 1)
-        for split in ("train", "validation", "test")
-    ]
-    again = posse.batch("constant", 50, seed=0)
-    again.reset()
-    starts.append(again.reset())
+    splits = ("train", "validation", "test")
+    batches = [posse.batch("constant", 50, seed=seed, split=split) for seed in (0, 1) for split in splits]
+    starts = [*(batch.reset() for batch in batches), batches[0].reset()]
     places = np.concatenate([start[:, 0, :10] for start in starts])
     assert len(np.unique(places, axis=0)) == len(places), "no world comes twice"
+
+
+def test_steps_of_trackers_are_counted_where_float32_rounds() -> None:
+    batch = played("constant", steps=0)
+    batch.arrays.world["tracker_steps"] = 2**24
+    batch.step(actions_for(batch, 0))
+    assert batch.state["world_tracker_steps"].tolist() == [2**24 + 5] * 3
 
 
 @pytest.mark.parametrize("name", ["smart", "leader-loss", "field", "robots"])
@@ -75,13 +77,6 @@ np.savez(sys.argv[3], *here(sys.argv[1], int(sys.argv[2])))
 """
 
 
-def in_another_process(tmp_path: Path, name: str, steps: int, **environment: str) -> list[npt.NDArray[Any]]:
-    out = tmp_path / "out.npz"
-    printed("-W", "error", "-c", IN_ANOTHER_PROCESS, name, str(steps), out, **environment)
-    with np.load(out) as arrays:
-        return [arrays[key] for key in arrays]
-
-
 # Eight worlds together and one alone: of the largest whole team, of one of which a few are chosen,
 # and of one of which many are; two of the largest teams, by radio and among all that there can be.
 LARGEST: dict[str, Any] = {"num_trackers": 64, "num_neighbours": 63, "start_distance": (4.0, 40.0)}
@@ -109,15 +104,16 @@ LONG = (("accelerating", 30), ("constant", 3), ("search", 3), ("radio", 1), ("du
 )
 def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:
     """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""
-    plain = in_another_process(tmp_path, name, steps, NUMBA_DISABLE_JIT="1")
-    for mine, theirs in zip(here(name, steps), plain, strict=True):
-        np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=1e-3)
+    out = tmp_path / "out.npz"
+    printed("-W", "error", "-c", IN_ANOTHER_PROCESS, name, str(steps), out, NUMBA_DISABLE_JIT="1")
+    with np.load(out) as plain:
+        for mine, theirs in zip(here(name, steps), plain.values(), strict=True):
+            np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=1e-3)
 
 
 # --- copies ---------------------------------------------------------------------------------------
 
 
-NOTHING_DRAWN = ("constant", "smart", "obstacles")
 DRAWS = ("accelerating", "radio", "leader-loss", "field")
 
 
@@ -135,12 +131,11 @@ def repeated(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
     return np.repeat(actions_for(batch, step), 2, axis=0)
 
 
-@pytest.mark.parametrize("name", [*NOTHING_DRAWN, *DRAWS])
+@pytest.mark.parametrize("name", ["constant", "smart", "obstacles", *DRAWS])
 def test_copies_draw_what_neither_their_original_nor_other_copies_draw(name: str) -> None:
     """And go on as their originals where nothing is drawn."""
     batch = played(name)
     copies = batch.copies(2)
-    assert copies.num_worlds == 6
     np.testing.assert_array_equal(copies.observe(), np.repeat(batch.observe(), 2, axis=0))
     seen, own = [], []
     for step in range(100, 500 if name == "leader-loss" else 130):
@@ -159,8 +154,7 @@ def test_what_copies_draw_follows_from_seed_and_step() -> None:
             seen = copies.step(repeated(batch, step))[0]
         return seen
 
-    used = played("field", 6)
-    np.testing.assert_array_equal(future(1), future(1, into=used))
+    np.testing.assert_array_equal(future(1), future(1, into=played("field", 6)))
     assert not np.array_equal(future(1), future(2))
 
 
