@@ -128,7 +128,7 @@ class Beliefs(Minds):
             mine[mask] = start[:1]
         self._seen[mask] = (-NEVER, 0.0, 0.0)
         self.newest[mask], self.age[mask] = -1, NEVER
-        self._told.heard[:, mask], self._told.fixed[:, mask] = False, False
+        self._told.heard[:, mask], self._told.fixed[:, mask], self._told.played[:, mask] = False, False, 0.0
         self.search.restart(mask)
 
     def plan(self, observations: FloatArray) -> FloatArray:
