@@ -75,9 +75,6 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="unknown setting 'foo'"):
         play_league(tiny(tmp_path / "new", training={"foo": 1}), console=quiet())
     assert not (tmp_path / "new").exists()
-    (tmp_path / "league.json").write_text("[")
-    with pytest.raises(RunFolderError, match="is damaged"):
-        play_league(settings, console=quiet())
 
 
 def test_harder_opponents_get_more_of_the_worlds() -> None:

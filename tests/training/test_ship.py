@@ -20,17 +20,10 @@ from posse_training.train.train import train
 SETTINGS = small(Path(), steps=640, team_sizes=(2, 3), hidden=(8,), evaluate_every=320, evaluate_worlds=2)
 
 
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
-    """Run folders of three training seeds."""
-    folder = tmp_path_factory.mktemp("runs")
-    for seed in (1, 2, 3):
-        settings = replace(SETTINGS, seed=seed, folder=folder / str(seed))
-        train(settings, console=quiet())
-    return tuple(folder / str(seed) for seed in (1, 2, 3))
-
-
-def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], tmp_path: Path) -> None:
+def test_the_best_seed_is_shipped_and_all_are_on_record(tmp_path: Path) -> None:
+    runs = tuple(tmp_path / "runs" / str(seed) for seed in (1, 2, 3))
+    for seed, folder in enumerate(runs, start=1):
+        train(replace(SETTINGS, seed=seed, folder=folder), console=quiet())
     path = ship(Settings(runs, "learned-trial", worlds=10, test_worlds=60, out=tmp_path))
     shipped = LearnedPolicy.from_file(path)
     assert shipped.name == "learned-trial"

@@ -13,7 +13,7 @@ import posse
 from posse_baselines import from_function, load, play
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
-from posse_training.evaluation.statistics import difference, improvement, mean, middle_mean, over_seeds
+from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
@@ -83,11 +83,6 @@ def test_episodes_in_which_it_never_happened_do_not_count() -> None:
         estimate = mean([1.0, np.nan, np.nan, np.nan, 3.0], block)
         assert (estimate.value, estimate.count) == (2.0, 2)
     assert mean([np.nan, np.nan]).count == 0
-
-
-def test_the_interquartile_mean_ignores_both_tails() -> None:
-    values = np.concatenate([np.full(50, 0.5), np.full(10, 1e6), np.full(10, -1e6)])
-    assert over_seeds(values, middle_mean).value == 0.5
 
 
 class TestTrainingSeeds:

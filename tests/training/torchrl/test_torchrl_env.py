@@ -109,9 +109,8 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     assert env.batch.arrays.world["episode"].tolist() == [0, 1, 0, 1, 1, 0]
 
 
-@pytest.mark.parametrize("buffers", [True, False])
-def test_the_ends_of_episodes_reach_serial_environments(buffers: bool) -> None:
-    rolled = SerialEnv(2, lambda: PosseEnv("smart", WORLDS, horizon=5), use_buffers=buffers).rollout(8)
+def test_the_ends_of_episodes_reach_serial_environments() -> None:
+    rolled = SerialEnv(2, lambda: PosseEnv("smart", WORLDS, horizon=5)).rollout(8)
     assert rolled["next", "done"].sum(dim=2).flatten().tolist() == [1] * (2 * WORLDS)
 
 
