@@ -17,6 +17,7 @@ from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
 from posse.rules.state import BROADCAST, perfect_radio
 from posse.scenarios import Scenario, ScenarioError, get_scenario
+from posse.scenarios.scenario import FAR
 from posse.scenarios.setting import check_count
 from posse.signals.layout import ObservationLayout
 
@@ -211,14 +212,15 @@ class Robot:
         return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._said, fix)
 
     def _checked(self, message: Heard) -> Heard:
-        _finite("a message heard", (*message[1:6], *message.message), (5 + len(message.message),))
+        said = tuple(message.message)
+        _finite("a message heard", (*message[1:6], *said), (5 + len(said),))
         _check_age(message.age)
         number = check_count("heard number", message.number, 0)
         if number >= self.scenario.num_trackers or number == self.number:
             raise ValueError(f"heard number={number}, which is no team-mate of {self.number}")
-        if len(message.message) not in (0, self.scenario.message_size):
-            raise ValueError(f"heard a message of {len(message.message)}, wanted {self.scenario.message_size} numbers")
-        return message._replace(fix=message.fix and self._checked_fix(message.fix))
+        if len(said) not in (0, self.scenario.message_size):
+            raise ValueError(f"heard a message of {len(said)}, wanted {self.scenario.message_size} numbers")
+        return message._replace(message=said, fix=message.fix and self._checked_fix(message.fix))
 
     def _checked_fix(self, fix: TargetFix) -> TargetFix:
         _finite("a fix", [value for value in fix if value is not None], (5 - (fix.frame is None),))
@@ -273,6 +275,6 @@ def _check_age(age: float) -> None:
 
 def _finite(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
     array = real_numbers(name, values).astype(np.float64)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ValueError(f"{name}={values!r} must be {shape[0]} finite numbers")
+    if array.shape != shape or not (np.abs(array) < FAR).all():  # also of nan
+        raise ValueError(f"{name}={values!r} must be {shape[0]} numbers between -{FAR:g} and {FAR:g}")
     return array
