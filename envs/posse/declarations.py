@@ -344,6 +344,11 @@ class metric(Declaration):  # noqa: N801
 
     unit: str
 
+    def _check(self) -> None:
+        super()._check()
+        if self.name in ("policy", "scenario", "scenario_version", "target", "seed", "split", "world"):
+            raise self.error(f"the name {self.name!r} is that of another column of results")
+
     @property
     def summed(self) -> bool:
         """Whether its function is compiled, and its values are summed over the steps."""

@@ -28,6 +28,7 @@ MISTAKES: Final = {
     "posse.target_motion('own')(lambda c, w: None)": r"<lambda> \(main.py:1\): its docstring.* is missing",
     "@posse.reward_term\ndef own(c, w, t):\n    return 1": r'own \(main.py:1\): the decorator needs arguments: .*"1"',
     '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
+    '@posse.metric("1")\ndef world(c, w):\n    """?"""': r"the name 'world' is that of another column of results",
     '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
