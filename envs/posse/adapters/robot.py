@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
@@ -148,7 +149,8 @@ class Robot:
                 nearest to the robot reads the distance of that point; another one, the distance along its axis.
                 Readings beyond ``sonar_range``, or ``None``: nothing is near.
             heard: What arrived since the last observation. Of each team-mate the last stays, and its age grows. What is
-                older than the first observation counts as being of that moment.
+                older than the first observation counts as being of that moment. A warning tells of what is heard later
+                than ``radio_delay``, which policies do not expect.
             touching: Whether it touches a robot, an obstacle or a wall.
 
         Raises:
@@ -220,6 +222,10 @@ class Robot:
             raise ValueError(f"heard number={number}, which is no team-mate of {self.number}")
         if len(said) not in (0, self.scenario.message_size):
             raise ValueError(f"heard a message of {len(said)}, wanted {self.scenario.message_size} numbers")
+        delay = self.scenario.radio_delay
+        if message.age > (delay + 0.5) * self.scenario.control_step:
+            late = f"tracker_{number} was heard {message.age:g} s late, and policies expect radio_delay={delay} steps"
+            warnings.warn(f"{late}: set it to that of the real radio", stacklevel=2)
         return message._replace(message=said, fix=message.fix and self._checked_fix(message.fix))
 
     def _checked_fix(self, fix: TargetFix) -> TargetFix:
