@@ -98,6 +98,7 @@ class Declaration:
         signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
             All but ``function`` may be ``None``.
         choices: The values that other attributes may have.
+        marks: What a name may hold beside letters and digits.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Declaration:
     known: ClassVar[Registry[Any]]
     signatures: ClassVar[Mapping[str, tuple[str, str]]]
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    marks: ClassVar[str] = "_"  # generated source uses the name in Python's names
 
     def __post_init__(self) -> None:
         if callable(first := next(iter(vars(self).values()))):
@@ -121,7 +123,7 @@ class Declaration:
         made = copy.copy(self)
         made.function, made.name = function, getattr(self, "name", getattr(plain(function), "__name__", ""))
         made._check()
-        taken = self.known.setdefault(made.name, made)
+        taken = self.known.get(made.name, made)
         if _home(taken.function) != _home(function):
             raise made.error(f"the name {made.name!r} is taken by {place_of(taken.function)}")
         self.known[made.name] = made
@@ -135,9 +137,8 @@ class Declaration:
                 setattr(self, attribute, self._checked(function, allowed))
         name: Any = self.name
         unit: Any = self.unit
-        dash = " and -" if isinstance(self, target_motion | sensor) else ""  # what others are called is Python's
-        if not isinstance(name, str) or not name.replace("-", "_" if dash else "-").isidentifier():
-            raise self.error(f"invalid name {name!r}: use letters, digits, _{dash}")
+        if not isinstance(name, str) or not name.replace(self.marks[-1], "_").isidentifier():
+            raise self.error(f"invalid name {name!r}: use letters, digits, {' and '.join(self.marks)}")
         if not self.meaning.strip():
             raise self.error("its docstring, which must state its meaning, is missing")
         if not isinstance(unit, str) or not unit:
@@ -390,6 +391,7 @@ class target_motion(Declaration):  # noqa: N801
     kind = "target motion"
     known: ClassVar = TARGET_MOTIONS
     unit = "-"
+    marks = "_-"
     signatures: ClassVar = {
         "function": (
             "(c, w) or (c, w, trackers) or (c, w, trackers, obstacles) or (c, w, trackers, obstacles, s)",
@@ -442,6 +444,7 @@ class sensor(Declaration):  # noqa: N801
     kind = "sensor"
     known: ClassVar = SENSORS
     unit = "-"
+    marks = "_-"
     signatures: ClassVar = {
         "function": ("(c, w, t, dx, dy) or (c, w, t, dx, dy, s)", "True or False"),
         "measure": ("(c, w, number, dx, dy)", "2 numbers"),
