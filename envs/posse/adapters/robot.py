@@ -224,8 +224,8 @@ class Robot:
             raise ValueError(f"heard a message of {len(said)}, wanted {self.scenario.message_size} numbers")
         delay = self.scenario.radio_delay
         if message.age > (delay + 0.5) * self.scenario.control_step:
-            late = f"tracker_{number} was heard {message.age:g} s late, and policies expect radio_delay={delay} steps"
-            warnings.warn(f"{late}: set it to that of the real radio", stacklevel=2)
+            late = f"messages arrive later than radio_delay={delay} steps, which policies expect"
+            warnings.warn(f"{late}: set it to that of the real radio", stacklevel=2)  # one text, which is shown once
         return message._replace(message=said, fix=message.fix and self._checked_fix(message.fix))
 
     def _checked_fix(self, fix: TargetFix) -> TargetFix:
