@@ -75,6 +75,10 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="unknown setting 'foo'"):
         play_league(tiny(tmp_path / "new", training={"foo": 1}), console=quiet())
     assert not (tmp_path / "new").exists()
+    held = json.loads((tmp_path / "league.json").read_text())
+    (tmp_path / "league.json").write_text(json.dumps({**held, "scenario_version": 0}))
+    with pytest.raises(RunFolderError, match="holds a run with scenario_version=0, not"):
+        play_league(settings, console=quiet())
 
 
 def test_harder_opponents_get_more_of_the_worlds() -> None:

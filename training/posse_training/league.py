@@ -100,8 +100,8 @@ class LeagueSettings:
         return (self.folder or Path("runs/league") / self.scenario).resolve()  # members are opponents by their paths
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the settings as plain values, without the folder, and the scenario's version."""
-        return {**asdict(self), "folder": None, "version": get_scenario(self.scenario).version}
+        """Return the settings as plain values, without the folder."""
+        return {**asdict(self), "folder": None}
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,8 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
     for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
         pairings(found.training(side, settings.path, ",".join(others)))
     with locked(settings.path):
-        hold_settings(settings.path / "league.json", settings.to_dict(), _FREE)
+        held = {**settings.to_dict(), "scenario_version": found.scenario.version}
+        hold_settings(settings.path / "league.json", held, _FREE)
         found.play()
         write_results(found)
     return found
