@@ -205,8 +205,14 @@ class Batch(OwnArrays):
         count, seed = check_count("count", count, 1), check_count("seed", seed, 0)
         self.check_started("copies")
         if into is None:
-            own = {name: getattr(self, name) for name in ("seed", "split", "num_threads", "clip_actions")}
-            into = Batch(self.scenario, self.num_worlds * count, **own)
+            into = Batch(
+                self.scenario,
+                self.num_worlds * count,
+                seed=self.seed,
+                split=self.split,
+                num_threads=self.num_threads,
+                clip_actions=self.clip_actions,
+            )
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.arrays.world, into.scenario, self.num_worlds * count)

@@ -88,7 +88,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
     wanted = actions
     if c.command_delay > 0:
-        wanted = worlds.command[e, w.step % c.command_delay]
+        wanted = worlds.command[e, w.step % c.command_delay]  # in whose place the actions wait, below
     if c.target_agent != 0:
         action = actions[c.num_trackers]
         w.speed = HALF * (action[0] + ONE) * c.target_speed
