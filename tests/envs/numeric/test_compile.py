@@ -104,60 +104,66 @@ EDITS = {
 }
 
 
-def write(folder: Path) -> None:
-    for name, text in {**MODULES, "main": MAIN}.items():
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / f"{name}.py").write_text(text)
+# Plays each folder's main.py as a new process would, as ``__main__`` without a file, with a cache of its own.
+PLAY = """
+import os, sys
+for folder, cache in zip(sys.argv[1::2], sys.argv[2::2]):
+    for name in ("gains", "deep", "deep.gains", "pairs", "lists", "plain"):
+        sys.modules.pop(name, None)
+    os.chdir(folder)
+    os.environ["POSSE_CACHE_DIR"] = cache
+    with open("main.py") as main:
+        exec(main.read())
+"""
 
 
-def play(folder: Path, cache: Path) -> tuple[list[str], str]:
-    """Run main.py in a new process, as ``__main__`` without a file; return what it prints, and the errors."""
-    command = ("-B", "-W", "error", "-c", (folder / "main.py").read_text())
-    done = python(*command, cwd=folder, POSSE_CACHE_DIR=str(cache))
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split(), done.stderr
-
-
-@pytest.fixture(scope="module")
-def cached(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a kernel in its cache."""
-    folder = tmp_path_factory.mktemp("cached")
-    write(folder)
-    printed, said = play(folder, folder / "cache")
-    assert printed[1:] == ["True", "0"]
-    assert said.count("\n") == 1
-    assert "compiling kernels" in said
-    assert play(folder, folder / "cache") == ([printed[0], "True", "1"], "")
+def write(folder: Path, name: str = "gains", old: str = "", new: str = "") -> Path:
+    """Write the modules into a folder, one of them changed."""
+    texts = {**MODULES, "main": MAIN}
+    assert old in texts[name]
+    texts[name] = texts[name].replace(old, new)
+    for module, text in texts.items():
+        (folder / module).parent.mkdir(exist_ok=True, parents=True)
+        (folder / f"{module}.py").write_text(text)
     return folder
 
 
-@pytest.mark.parametrize("what", EDITS)
-def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(
-    what: str, cached: Path, tmp_path: Path
-) -> None:
-    write(tmp_path)
-    name, old, new = EDITS[what]
-    path = tmp_path / f"{name}.py"
-    assert old in path.read_text()
-    path.write_text(path.read_text().replace(old, new))
-    assert play(tmp_path, cached / "cache")[0][1:] == ["True", "1" if "not reach" in what else "0"]
+def play(*folders: tuple[Path, Path]) -> tuple[list[list[str]], str]:
+    """Run the main.py of folders with their caches in a new process; return what each prints, and the errors."""
+    done = python("-B", "-W", "error", "-c", PLAY, *(path for pair in folders for path in pair))
+    assert done.returncode == 0, done.stderr
+    return [line.split() for line in done.stdout.splitlines()], done.stderr
+
+
+def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(tmp_path: Path) -> None:
+    first, cache = write(tmp_path / "first"), tmp_path / "cache"
+    [printed], said = play((first, cache))
+    assert printed[1:] == ["True", "0"]
+    assert said.count("\n") == 1
+    assert "compiling kernels" in said
+    assert play((first, cache)) == ([[printed[0], "True", "1"]], "")
+    folders = [write(tmp_path / what, *edit) for what, edit in EDITS.items()]
+    played, _ = play(*((folder, cache) for folder in folders))
+    hits = {what: printed[1:] for what, printed in zip(EDITS, played, strict=True)}
+    assert hits == {what: ["True", "1" if "not reach" in what else "0"] for what in EDITS}
 
 
 def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
     """Also one that holds another kernel."""
-    write(tmp_path)
-    whole = []
-    for gain in ("A = 3.0", "A = 1.0"):
-        (tmp_path / "gains.py").write_text(MODULES["gains"].replace("A = 1.0", gain))
-        play(tmp_path, tmp_path / "cache")
-        (path,) = (each for each in (tmp_path / "cache").iterdir() if each.read_bytes() not in whole)
-        whole.append(path.read_bytes())
-    flipped = bytearray(whole[1])
+    other = write(tmp_path / "other", "gains", "A = 1.0", "A = 3.0"), tmp_path / "other-cache"
+    mine = write(tmp_path / "mine"), tmp_path / "cache"
+    play(other, mine)
+    (path,), (another,) = mine[1].iterdir(), other[1].iterdir()
+    whole = path.read_bytes()
+    flipped = bytearray(whole)
     flipped[len(flipped) // 2] ^= 8
-    for damaged in (flipped, whole[1][:-100], whole[0]):
-        path.write_bytes(damaged)
-        assert play(tmp_path, tmp_path / "cache")[0][1:] == ["True", "0"]
-    assert play(tmp_path, tmp_path / "cache")[0][1:] == ["True", "1"]
+    caches = [tmp_path / name for name in ("flipped", "short", "another")]
+    for cache, damaged in zip(caches, (bytes(flipped), whole[:-100], another.read_bytes()), strict=True):
+        cache.mkdir()
+        (cache / path.name).write_bytes(damaged)
+    for hits in "01":
+        played, _ = play(*((mine[0], cache) for cache in caches))
+        assert [printed[1:] for printed in played] == [["True", hits]] * 3
 
 
 def test_processes_share_a_folder(tmp_path: Path) -> None:
@@ -171,6 +177,6 @@ def test_processes_share_a_folder(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_costs_time_only(tmp_path: Path) -> None:
     write(tmp_path)
     (tmp_path / "file").write_text("")
-    printed, said = play(tmp_path, tmp_path / "file" / "cache")
+    [printed], said = play((tmp_path, tmp_path / "file" / "cache"))
     assert printed[1:] == ["True", "0"]
     assert "set POSSE_CACHE_DIR" in said
