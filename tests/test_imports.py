@@ -38,7 +38,10 @@ def test_imports_run_one_way(place: str) -> None:
     assert [each for each in found if each[1].startswith(FORBIDDEN[place])] == []
 
 
-@pytest.mark.parametrize("package", ["posse", "posse_baselines", "posse_training.demo"])
+PLAYING = ["posse", "posse_baselines", *(f"posse_training.{each}" for each in ("demo", "compare.report", "reproduce"))]
+
+
+@pytest.mark.parametrize("package", PLAYING)
 def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
     others = set(LEARNING) - {package.partition(".")[0]}
     code = f"import sys, {package}; print(*sorted(set(sys.modules) & {others!r}))"

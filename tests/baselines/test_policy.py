@@ -1,14 +1,11 @@
 """Properties of every policy: shapes, ranges, equality over batches, restarts, refusals."""
 
-import os
-import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.support.adapters import out_of_band
 from tests.support.learned import policy_for
-from tests.support.process import printed
 
 import posse
 from posse_baselines import BasePolicy, Policy, PolicyError, begin, load, policy_names, rollout
@@ -51,18 +48,6 @@ def test_an_episode_unpickled_from_buffers_goes_on_as_before(name: str) -> None:
             observations, *_ = batch.step(actions)
         ends.append(observations)
     np.testing.assert_array_equal(ends[0], ends[1])
-
-
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
-def test_memory_serves_on_a_machine_with_more_cores() -> None:
-    code = """import os, pickle
-os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])
-import posse, posse_baselines
-print(pickle.dumps(posse_baselines.load("learned-smart").begin(posse.batch("smart", 1).layout, 500)).hex())"""
-    policy, batch = load("learned-smart"), posse.batch("smart", 500)
-    observations, memory = batch.reset(seed=0), pickle.loads(bytes.fromhex(printed("-c", code)))  # noqa: S301
-    wanted, _ = policy.act(observations, policy.begin(batch.layout, 500))
-    np.testing.assert_array_equal(policy.act(observations, memory)[0], wanted)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,6 +1,7 @@
 """Robots that are given what the trackers of a world measure observe and do the same as those."""
 
 import copy
+import json
 import math
 from collections.abc import Iterator
 from contextlib import nullcontext
@@ -58,6 +59,7 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
     s = batch.scenario
     robots = [deploy(team, Robot(s, i, scale=SCALE)) for i in range(s.num_trackers)]
     observations, memory, alike = batch.reset(), begin(team, batch), []
+    told_before = [(0.0,) * s.message_size] * s.num_trackers
     for _ in range(120):
         actions, memory = team.act(observations, memory)
         sonar = batch.layout.views(observations[0])["sonar"]
@@ -76,7 +78,8 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
             np.testing.assert_allclose(told[2:], actions[0, i, 2:], atol=1e-4)
             alike.append(np.allclose(told, actions[0, i], atol=1e-4))
             said, age = robot.robot.broadcast(), (batch.arrays.world["step"][0] - t.fix_step) * s.control_step
-            assert (said.number, said.message) == (i, command.message)
+            assert (said.number, said.message) == (i, told_before[i]), "the message that led to the pose"
+            told_before[i] = command.message
             assert said[1:6] == pytest.approx(motion_of(t))
             assert (said.fix is None) == (t.fix_step < 0)
             if said.fix is not None and frame:
@@ -96,6 +99,24 @@ def test_what_is_older_than_the_first_observation_counts_as_of_then() -> None:
     for _ in range(robot.scenario.horizon):
         row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0)
     assert robot.layout.views(row)["time_left"] == 0.0  # it may go on longer than an episode
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_what_is_older_the_newest_is_taken(order: int) -> None:
+    robot = Robot("constant", 0, radio_delay=30)
+    old, new = (TargetFix(x, 0.0, 0.0, age) for x, age in ((9.0, 1.0), (2.0, 0.1)))
+    told = [Heard(1, 10 * fix.x, 0.0, 0.0, 0.0, 0.0, fix=fix, age=fix.age) for fix in (old, new)][::order]
+    received = [Heard(*each) for each in json.loads(json.dumps(told))]
+    older = Heard(1, 90.0, 0.0, 0.0, 0.0, 0.0, fix=old, age=2.0)
+    for fix, heard in ((old, received), (None, [older])):
+        v = robot.layout.views(robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, fix, heard=heard))
+        assert [*v["target_range"].flat, v["neighbour_range"][0]] == [2.0, 20.0]
+    assert np.isfinite(v["target_velocity"]).all()
+
+
+def test_commands_leave_room_for_the_turn() -> None:
+    command = Robot("robots", 0, scale=2.0).command((1.0, 1.0))
+    assert 2.0 * command.speed + 0.287 / 2 * command.turn_rate == pytest.approx(0.26)
 
 
 def test_a_radio_that_is_later_than_the_scenarios_is_told() -> None:

@@ -47,11 +47,8 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     [
         ["scenarios"],
         *([command, "--help"] for command in ("train", "record", "export")),
-        pytest.param(["compare", "idle", "--scenario", "constant", "--episodes", "2"], marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif", "--seconds", "1"],
-        pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
-        pytest.param(["demo", "--episodes", "2", "--seconds", "1"], marks=pytest.mark.long),
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +46,11 @@ def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
 
 def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -> None:
     train(small(tmp_path / "whole", "cmaes", **EVOLVED), console=quiet())
-    with killed_at(evolution, "write_json", 3):
+    with killed_at(evolution, "write_json", 2):
         train(small(tmp_path / "cut", "cmaes", **EVOLVED), console=quiet())
+    shutil.copytree(tmp_path / "cut", tmp_path / "ended")
+    resume(tmp_path / "ended", steps=1)
+    assert (tmp_path / "ended/curve.csv").read_text().splitlines()[-1].startswith("1280.0,")
     resume(tmp_path / "cut")
     resume(tmp_path / "cut", steps=1)
     mine, other = (load_file(tmp_path / name / "last.safetensors") for name in ("whole", "cut"))

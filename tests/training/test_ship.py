@@ -1,20 +1,17 @@
-"""Shipping: the best of several training seeds, with the scores of all seeds."""
+"""Shipping: the best of several training seeds, with the scores of all."""
 
 import json
-import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-import tyro
-from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
+from scripts.ship import CHOICE_SEED, Settings, replay, ship
 from tests.support.runs import quiet, small
 
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.leaderboard import SEED
-from posse_training.train import TrainSettings, default_settings
 from posse_training.train.train import train
 
 SETTINGS = small(Path(), steps=640, team_sizes=(2, 3), hidden=(8,), evaluate_every=320, evaluate_worlds=2)
@@ -50,25 +47,3 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(tmp_path: Path) -> None:
     assert all(play["settings"]["horizon"] == 40 for play in check["plays"])
     assert replay(shipped, check) == [play["score"] for play in check["plays"]]
     assert str(runs[0].parent) not in json.dumps(shipped.card)
-
-
-def test_the_command_on_record_gives_the_settings_again() -> None:
-    for settings in (
-        replace(
-            default_settings("constant"),
-            overrides={"horizon": 40, "settle_time": 1.0},
-            seed=7,
-            reward_weights={"contact": -0.2, "progress": 0.5, "slot": 0.25},
-            team_sizes=(2, 3),
-            imitate="ddcs-distributed",
-            safeguard=False,
-            beside=None,
-            tensorboard=False,
-        ),
-        replace(default_settings("smart,radio", "sac"), wandb="my project"),
-        default_settings("field", preset="residual"),
-        replace(default_settings("smart"), imitate=None, log_deviation=-0.5),
-    ):
-        words = shlex.split(command_of(settings))[2:]
-        default = default_settings(settings.scenario, settings.algorithm)
-        assert tyro.cli(TrainSettings, default=default, args=words) == settings

@@ -18,11 +18,7 @@ class SettingsError(UserError, ValueError):
 
 
 class RunFolderError(UserError, RuntimeError):
-    """A run folder or a file in it that cannot be used; the message says why and what to do."""
-
-
-class DivergedError(UserError, RuntimeError):
-    """A training whose networks give numbers that are not finite."""
+    """A run that cannot go on, or whose folder cannot be used; the message says why and what to do."""
 
 
 class PlayError(UserError, RuntimeError):

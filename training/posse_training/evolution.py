@@ -93,9 +93,12 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
             continue
         steps = (generation + 1) * each
         display.progress(steps, float(np.mean(scores[-1])))
-        if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every or generation + 1 == generations:
+        if steps // s.evaluate_every > curve[-1]["steps"] // s.evaluate_every:
             evaluate(steps)
         state["seconds"] = time.monotonic() - started
+        write_json(folder / STATE, state, indent=None)
+    if curve[-1]["steps"] < generations * each:  # also where a run is ended by fewer steps
+        evaluate(generations * each)
         write_json(folder / STATE, state, indent=None)
     team([cma.mean], make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST

@@ -101,7 +101,7 @@ def film(
         start: Simulated time at which the film begins, s; the episode is played from 0.
         seconds: Simulated time to film, s; less if every episode ends before.
         speed: Simulated seconds per second of film; rounded in a GIF, which counts in 1/100 s.
-        every: Control steps between two frames.
+        every: Control steps between two frames; in a GIF at least 2/100 s of film.
         size: Side of a panel, or width and height of all; default: 560 px for one, 400 for more.
         scores: Whether curves of each team's score in the last second stand below.
         **overrides: Settings of the scenario.
@@ -125,14 +125,19 @@ def film(
             raise SettingsError(f"{name}={value!r} must be a {'whole' if name == 'every' else 'finite'} number above 0")
     if not 0 <= start < settings.duration:
         raise SettingsError(f"start={start!r} (--from) must be 0 to below {settings.duration:g} s, the duration")
+    if write is _gif:  # which shows a frame for 0.02 to 655 s
+        every = max(every, math.ceil(0.02 * speed / settings.control_step - 1e-9))
+        if every * settings.control_step / speed > 655:
+            raise SettingsError(f"speed={speed!r} is too low for a GIF, whose frames are shown for at most 655 s")
     given = (560 if len(policies) == 1 else 400) if size is None else size
     width, height = (given, given) if isinstance(given, int) else (given[0] // len(policies), given[1])
     if min(width, height) < LEAST_SIZE or max(width * len(policies), height) > _LARGEST:
         raise SettingsError(f"size={size!r} must be at least {LEAST_SIZE} px a panel, and at most {_LARGEST} in all")
     first, last = (round(time / settings.control_step) for time in (start, min(start + seconds, settings.duration)))
+    last = max(last, first + 1)
 
     teams = [(label, Team(policy, settings, seed, world, split, target)) for label, policy in policies]
-    drawn = _frames(teams, (width, height), first, max(last, first + 1), every, speed)
+    drawn = _frames(teams, (width, height), first, last, every, speed)
     frames = (_with_curves(frame, teams, first, last) if scores else frame for frame in drawn)
     opening = next(frames, None)
     if opening is None:
@@ -203,7 +208,7 @@ def _with_curves(image: Image.Image, teams: Teams, first: int, last: int) -> Ima
         draw.line([(left, y), (right, y)], style.GRID, round(k))
         draw.text((left - 8 * k, y), str(value), style.FAINT_INK, ImageFont.load_default(11 * k), anchor="rm")
     for (_, team), colour in zip(teams, itertools.cycle(PLAYERS)):
-        second = round(1 / team.batch.scenario.control_step)
+        second = math.ceil(1 / team.batch.scenario.control_step)
         smooth = np.convolve([0.0, *team.scores], np.full(second, 1 / second))[first : len(team.scores) + 1]
         points = [(left + (right - left) * n / (last - first), low - (low - top) * v) for n, v in enumerate(smooth)]
         if len(points) > 1:

@@ -38,12 +38,9 @@ SCORES: Final = ("score", "safe_score", "contact_free")
 Cell = dict[str, Estimate]
 """What a team scores against a target, by these names; the last one is the share of episodes without contact."""
 TEST_SEED: Final = 7
-CHOICE: Final = (1, 32)
-"""Seed and number of the validation worlds by which opponents are weighed."""
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
 _FREE: Final = ("generations", "responses", "episodes")
 """Settings that the command that resumes a league may change."""
-_STEPS: Final = (1, 10**12)
 _COLUMNS: Final = 4  # of targets, which fit into 80 characters
 
 
@@ -59,9 +56,9 @@ class LeagueSettings:
     """Teams at the beginning: names or files."""
     targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
     """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
-    target_steps: int = number(2_000_000, "", *_STEPS)
+    target_steps: int = number(2_000_000, "", 1, 10**12)
     """Steps of each target's training."""
-    team_steps: int = number(6_000_000, "", *_STEPS)
+    team_steps: int = number(6_000_000, "", 1, 10**12)
     """Steps of each team's training, of one tracker each."""
     responses: Literal["last", "all", "none"] = "last"
     """For which generations a best response is trained, which says how much it can be exploited."""
@@ -178,11 +175,11 @@ class League:
         s = self.settings
         first = {"none": s.generations, "last": s.generations - 1, "all": 0}[s.responses]
         sign = -1 if side == TARGET else 1  # the strongest target has the lowest score
-        for to in [m for m in of if m.run is not None][first:]:
+        for generation, to in [*enumerate((m for m in of if m.run is not None), 1)][first:]:
             run = s.path / "responses" / f"{side}-to-{to.label}"
             best = Member(f"response to {to.label}", str(run / BEST), run)
             if not best.trained:
-                self._train(side, best, to.policy, s.longer, others)
+                self._train(side, best, to.policy, s.longer, self._members(side, generation))
             found = {m.label: self._cell(*((to, m) if side == TARGET else (m, to))) for m in (*others, best)}
             after = found.pop(best.label)
             opponent = max(found, key=lambda label: sign * found[label]["score"].value)
@@ -234,7 +231,7 @@ class League:
 
         For a team 1 less its safe score; for a target the team's score.
         """
-        seed, worlds = CHOICE
+        seed, worlds = 1, 32
         if side == TARGET:
             return float(self._play(other, own, worlds, seed, "validation")["score"].mean())
         return 1 - float(self._play(own, other, worlds, seed, "validation")["safe_score"].mean())

@@ -16,8 +16,10 @@ from posse.rendering.renderer import Renderer
 from posse.rendering.style import TRACKER
 from posse_baselines import Policy, PolicyError, Recorder, begin, load
 from posse_training.errors import SettingsError
+from posse_training.evaluation.evaluation import played_errors
 from posse_training.options import OneWorld
 from posse_training.replay import RECORD, Replay, replay_of, write_replay
+from posse_training.replay.page import check_page
 
 _SIZES: Final = (200, 4096)  # px, least and most
 _ARROWS: Final = ("left", "right", "up", "down")
@@ -46,8 +48,7 @@ class _Play(OneWorld):
 def main(arguments: Sequence[str]) -> None:
     """Play, and write the replay page."""
     which = tyro.cli(_Play, prog="posse play", args=arguments)
-    if which.out.suffix.lower() not in (".html", ".htm"):
-        raise SettingsError(f"--out {which.out} must end in .html or .htm")
+    check_page(which.out)
     scenario = get_scenario(which.scenario, **which.overrides)
     robots = [*(f"tracker_{k}" for k in range(scenario.num_trackers)), "target"]
     if which.robot not in robots:
@@ -110,7 +111,8 @@ def play(
             batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
             recorder = Recorder(batch, RECORD)
             renderer.title = f"{who}, world {world}"
-            scores = _play_round(policy, recorder, robot, renderer, window)
+            with played_errors():
+                scores = _play_round(policy, recorder, robot, renderer, window)
             if scores:
                 last = replay_of(recorder.trajectory(), f"{policy.name}, {who}")
             if recorder.over.all():

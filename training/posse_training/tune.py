@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+from typing import Annotated, Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -34,9 +34,6 @@ from posse_training.files import hold_settings, intact, locked
 from posse_training.options import Ray
 from posse_training.parallel import all_on_ray, connected
 from posse_training.provenance import commit, software
-
-if TYPE_CHECKING:
-    from cmaes import CMA, SepCMA
 
 Point = npt.NDArray[np.float64]
 STATE: Final = "state.json"
@@ -133,9 +130,7 @@ class Space:
         return {t.name: values[t.name] for t in self.tunables if t.name in self.names or values[t.name] != t.default}
 
 
-def advance(
-    cma: CMA | SepCMA, scores: list[list[float]], generation: int, score: Callable[[list[Point]], list[float]]
-) -> None:
+def advance(cma: Any, scores: list[list[float]], generation: int, score: Callable[[list[Point]], list[float]]) -> None:
     """Advance a search by a generation: one on record is drawn again and takes its scores, a new one is scored."""
     points = [cma.ask() for _ in range(cma.population_size)]
     if generation == len(scores):
@@ -230,7 +225,7 @@ class _Run:
         s, done = self.settings, len(self.scores)
         return done >= s.generations if s.generations is not None else done > 0 and self.seconds >= 60.0 * s.minutes
 
-    def _generation(self, cma: CMA, space: Space, generation: int) -> None:
+    def _generation(self, cma: Any, space: Space, generation: int) -> None:
         """Score a generation on worlds of its own, the same for all its candidates; scores on record are taken."""
         s, first = self.settings, generation * self.settings.worlds
 

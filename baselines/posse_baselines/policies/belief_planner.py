@@ -102,7 +102,7 @@ class Beliefs(Minds):
         """The worlds as they were at the beginning of the window, before anything was written of that moment."""
         self._start = self.now.arrays.copy()  # every world starts as the first of these
         self._start.world["step"] = -window - 1
-        self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
+        self._start.tracker["x"], self._start.tracker["broken_at"], self._start.tracker["fix_step"] = _AWAY, 0, -1
         self._seen = np.zeros(self.rows, _SEEN)  # as of the past
         self.newest, self.age = np.zeros(self.rows, np.int64), np.zeros(self.rows, np.int64)
         shape = window + 1, self.rows, scenario.num_trackers

@@ -93,6 +93,8 @@ class Search(OwnArrays):
         for _ in range(delay):
             self._later.arrays.world["over"] = 0  # one that has ended goes on, and draws no start
             self._later.step(unread)
+        late = self.batch.arrays.world["step"] >= self.batch.scenario.horizon
+        self._later.arrays.world["over"][late] = self.batch.arrays.world["over"][late]
         return self._later
 
     def _plan(self, worlds: Batch, due: BoolArray, planning: npt.NDArray[np.int64]) -> None:
@@ -138,7 +140,7 @@ def play_ahead(teams: Teams, copies: Batch, steps: int) -> npt.NDArray[np.float6
         world[name] = 0  # those before now are the same for all
     worth = np.zeros(copies.num_worlds)
     actions = actions_of_target(copies)
-    going = np.asarray(world["over"] == 0)
+    going, late = np.asarray(world["over"] == 0), np.asarray(world["step"] >= s.horizon)  # robots may go on
     for _ in range(steps):
         drive(teams, copies, going, actions)
         if s.command_delay:  # in the place of the command that is due
@@ -149,7 +151,7 @@ def play_ahead(teams: Teams, copies: Batch, steps: int) -> npt.NDArray[np.float6
         touched = going & (world[_CONTACTS[0]] + world[_CONTACTS[1]] + world[_CONTACTS[2]] > 0)
         going &= ~touched
         worth += np.where(going, infos["score"], 0.0) - 2.0 * steps * touched
-        going &= ~(terminated | truncated)
+        going &= ~(terminated | (truncated & ~late))
     away = copies.arrays.tracker["slot_distance"].mean(axis=1)
     return np.asarray(worth - np.where(going, away, 0.0))
 
@@ -184,7 +186,10 @@ class Planner(BasePolicy):
         self._batch = batch
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory for the watched batch; PolicyError if no batch, or one of other worlds, is watched."""
+        """Return the memory for the watched batch, which is to be copied only together with it.
+
+        PolicyError if no batch, or one of other worlds, is watched.
+        """
         super().begin(layout, num_worlds)
         batch = self._batch
         if batch is None or batch.num_worlds != num_worlds or batch.scenario != layout.scenario:

@@ -146,8 +146,8 @@ class WorldEnv(BatchEnv):
         return state
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
-        return self._draw()
+        """Draw the current state, (H, W, 3) uint8; ``None`` in the mode "human", whose window every step draws."""
+        return None if self.render_mode == "human" else self._draw()
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start an episode and return the agents' observations (..., F)."""

@@ -69,7 +69,7 @@ class Command(NamedTuple):
     turn_rate: float
     """rad/s, positive to the left."""
     message: tuple[float, ...]
-    """For its next broadcast."""
+    """For its broadcasts after the next observation: of a step earlier than the pose, as a tracker's."""
 
 
 class Robot:
@@ -119,7 +119,8 @@ class Robot:
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
         self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
-        self._said: tuple[float, ...] = (0.0,) * self.scenario.message_size
+        self._newest: dict[int, int] = {}  # step of each team-mate's last pose and, by the own number, of the last fix
+        self._said = self._told = (0.0,) * self.scenario.message_size
 
     @property
     def _me(self) -> Any:
@@ -148,9 +149,9 @@ class Robot:
                 direction 2πk / S to the left of ahead, π / S to each side. A beam that contains the point of a body
                 nearest to the robot reads the distance of that point; another one, the distance along its axis.
                 Readings beyond ``sonar_range``, or ``None``: nothing is near.
-            heard: What arrived since the last observation. Of each team-mate the last stays, and its age grows. What is
-                older than the first observation counts as being of that moment. A warning tells of what is heard later
-                than ``radio_delay``, which policies do not expect.
+            heard: What arrived since the last observation. Of each team-mate the newest stays, and its age grows. The
+                newest of what is older than the first observation counts as being of that moment. A warning tells of
+                what is heard later than ``radio_delay``, which policies do not expect.
             touching: Whether it touches a robot, an obstacle or a wall.
 
         Raises:
@@ -166,16 +167,18 @@ class Robot:
         messages = [self._checked(message) for message in heard]
         fix = None if target_fix is None else self._checked_fix(target_fix)
 
-        self.steps += 1
+        self.steps, self._told = self.steps + 1, self._said
         world, me = self._world.arrays.world[0], self._me
         world.step = self.steps
         self._pose = (x, y, heading)
         _place(me, x * self.scale, y * self.scale, heading)
         me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, bool(touching), fix is not None
-        if fix is not None:
-            self._take(fix)
         for message in messages:
             self._hear(message)
+        fixes = [] if fix is None else [fix]
+        fixes += [each.fix._replace(age=each.fix.age + each.age) for each in messages if each.fix is not None]
+        for each in fixes:
+            self._take(each)
         row: FloatArray = self._world.observe()[0, self.number].copy()
         if beams:
             reach = self.scenario.sonar_range
@@ -195,11 +198,15 @@ class Robot:
             raise ValueError(f"action={action!r} must lie in [-1, 1]")
         forward, turn, *said = np.clip(numbers, -1.0, 1.0).tolist()
         self._said = tuple(said)
-        top_speed = self.scenario.tracker_speeds[self.number] / self.scale
-        return Command((forward + 1) / 2 * top_speed, turn * self.scenario.tracker_turn_rates[self.number], self._said)
+        s, turn_rate = self.scenario, turn * self.scenario.tracker_turn_rates[self.number]
+        most = s.tracker_speeds[self.number]
+        speed = min(
+            (forward + 1) / 2 * most, max(0.0, most - 0.5 * s.wheel_base * abs(turn_rate))
+        )  # as rules.motion.obey
+        return Command(speed / self.scale, turn_rate, self._said)
 
     def broadcast(self) -> Heard:
-        """Return what team-mates should hear of it now: its last measurements and its policy's last message."""
+        """Return what team-mates should hear of it now: its last measurements, and what its policy said before."""
         if self.steps < 0:
             raise ValueError("broadcast before the first observation: call observe() first")
         me, fix = self._me, None
@@ -211,7 +218,7 @@ class Robot:
                 (self.steps - int(me.fix_step)) * self.scenario.control_step,
                 math.atan2(me.fix.frame_sin, me.fix.frame_cos),
             )
-        return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._said, fix)
+        return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._told, fix)
 
     def _checked(self, message: Heard) -> Heard:
         said = tuple(message.message)
@@ -226,22 +233,31 @@ class Robot:
         if message.age > (delay + 0.5) * self.scenario.control_step:
             late = f"messages arrive later than radio_delay={delay} steps, which policies expect"
             warnings.warn(f"{late}: set it to that of the real radio", stacklevel=2)  # one text, which is shown once
-        return message._replace(message=said, fix=message.fix and self._checked_fix(message.fix))
+        return message._replace(message=said, fix=None if message.fix is None else self._checked_fix(message.fix))
 
     def _checked_fix(self, fix: TargetFix) -> TargetFix:
+        if not 3 <= len(fix) <= 5:
+            raise ValueError(f"fix={fix!r} must be x, y, heading, and perhaps age and frame")
+        fix = TargetFix(*fix)  # also of JSON's list
         _finite("a fix", [value for value in fix if value is not None], (5 - (fix.frame is None),))
         _check_age(fix.age)
         return fix
 
-    def _step_of(self, age: float) -> int:
-        """Return the step of a measurement, the first one if it is older."""
-        return max(0, self.steps - round(age / self.scenario.control_step))
+    def _step_of(self, number: int, age: float) -> int | None:
+        """Return the step of a pose or fix, the first one if it is older; ``None``: it is not newer than the last."""
+        step = self.steps - round(age / self.scenario.control_step)
+        if step <= self._newest.get(number, -math.inf):
+            return None
+        self._newest[number] = step
+        return max(0, step)
 
     def _take(self, fix: TargetFix) -> None:
         """Take a fix, if it is newer than the last one, as a tracker of a world does."""
-        me, step = self._me, self._step_of(fix.age)
-        if step <= me.fix_step:
+        me, step = self._me, self._step_of(self.number, fix.age)
+        if step is None:
             return
+        if step == me.fix_step:  # both are older than the first observation
+            me.fix_step = -1
         new, config = np.zeros(1, BROADCAST)[0], self._config
         new.fix_step, f = step, new.fix
         _place(f, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
@@ -256,16 +272,14 @@ class Robot:
         take_fix(config, me, new)
 
     def _hear(self, message: Heard) -> None:
-        """Store a message, unless a later one of the same team-mate was heard, and take its fix."""
-        arrays, step = self._world.arrays, self._step_of(message.age)
+        """Store a message, unless a later one of the same team-mate was heard."""
+        arrays, step = self._world.arrays, self._step_of(message.number, message.age)
         heard = arrays.heard[0, self.number, message.number]
-        if step >= heard.step:
+        if step is not None:
             heard.step = step
             _place(heard, message.x * self.scale, message.y * self.scale, message.heading)
             heard.speed, heard.turn_rate = message.speed * self.scale, message.turn_rate
             arrays.heard_message[0, self.number, message.number] = message.message or 0.0
-        if message.fix is not None:
-            self._take(message.fix._replace(age=message.fix.age + message.age))
 
 
 def _place(record: Any, x: float, y: float, heading: float, prefix: str = "heading_") -> None:

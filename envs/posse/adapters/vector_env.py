@@ -98,8 +98,8 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         return found
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
-        """Draw every world, (H, W, 3) uint8 each; in the mode "human", world 0 in a window."""
-        drawn = [self._draw(world) for world in range(1 if self.render_mode == "human" else self.num_envs)]
+        """Draw every world, (H, W, 3) uint8 each; ``None`` in the mode "human", whose window every step draws."""
+        drawn = [] if self.render_mode == "human" else [self._draw(world) for world in range(self.num_envs)]
         return tuple(frame for frame in drawn if frame is not None) or None
 
 

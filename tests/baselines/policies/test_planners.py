@@ -68,6 +68,18 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
     rollout(batch, Planner(QUICK), steps=5, options=poses)
 
 
+@pytest.mark.parametrize("delay", [0, 2])
+def test_it_plans_beyond_the_end_of_an_episode(delay: int) -> None:
+    """As a robot may, which goes on."""
+    actions = []
+    for horizon in (50, 600):
+        batch = posse.batch("smart", 3, horizon=horizon, settle_time=1.0, command_delay=delay)
+        batch.reset()
+        batch.arrays.world["step"] = 60
+        actions.append(begin(Planner(), batch).actions())
+    np.testing.assert_allclose(actions[0], actions[1])
+
+
 def test_the_planner_reads_only_the_batch_it_watches() -> None:
     planner, other = load("planner"), posse.batch("smart", 3, num_trackers=3)
     with pytest.raises(PolicyError, match="watches none, not 3 of 'smart', whose state it reads: show it their batch"):
@@ -134,4 +146,7 @@ def test_noisy_fixes_are_filtered() -> None:
     played = rollout(batch, policy, ["annotations", "target_pose"], steps=30)
     away = np.abs(played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]).max(axis=-1)
     assert np.median(away[10:]) < 0.3 * np.median(away[0])
+    memory = begin(policy, batch)
+    policy.act(batch.reset(), memory)
+    assert np.isfinite(memory.now.observe()).all(), "as worlds of a user's own motion must be"
     believed(batch.scenario.replace(arena=990.0, start_distance=(1.0, 1000.0)))  # the widest that is allowed

@@ -56,6 +56,9 @@ def test_the_window_of_an_environment_can_be_paused_stepped_and_closed() -> None
         env.step(actions)
         assert pressed.pop() == key
     env.step(actions)  # goes on by itself
+    press(pygame.K_EQUALS)
+    assert env.render() is None
+    assert pygame.event.peek(pygame.KEYDOWN), "the window is drawn by steps alone"
     press(pygame.K_SPACE, pygame.K_ESCAPE)
     env.step(actions)
     env.step(actions)  # without a window

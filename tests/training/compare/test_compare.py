@@ -118,9 +118,12 @@ def test_a_policy_that_cannot_play_is_left_out_with_a_line(
 @pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--scenario", "constant", "leader-loss", "--episodes", "3"]
-    assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
-    for suffix in ("png", "svg"):
-        assert {path.stem for path in tmp_path.glob(f"*.{suffix}")} == {"profile", "scenarios", "recovery"}
+    for folder, changed in ((tmp_path / "lost", []), (tmp_path / "none", ["breaks=0", "num_trackers=1", "horizon=30"])):
+        assert main(["compare", "pursuit", *options, "--replays", "0", "--out", str(folder), "--set", *changed]) == 0
+        for suffix in ("png", "svg"):
+            drawn = {path.stem for path in folder.glob(f"*.{suffix}")}
+            assert drawn == {"profile", "scenarios", *([] if changed else ["recovery"])}
+    assert "NaN" not in (tmp_path / "none/summary.json").read_text(), "where the planner holds no slot"
     assert "planner" in capsys.readouterr().out
 
 

@@ -55,6 +55,12 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
     assert replay.world["changed"] == {"num_trackers": [5, 3]}
     assert main(["replay", "replay.html", "random", *world]) == 2
     assert "did not play the same world: num_trackers" in capsys.readouterr().err
+    assert main(["replay", "replay.html", "random", *world[:-1], "--set", "num_trackers=3", "--out", "all.html"]) == 0
+    assert command(read_replay(tmp_path / "all.html")) == "", "one played with other options"
+    duel = ["--scenario", "duel", "--seconds", "1", "--target"]
+    assert main(["replay", "idle", *duel, "evader"]) == 0
+    assert main(["replay", "replay.html", "idle", *duel, "eight"]) == 2
+    assert "did not play the same world: target differ" in capsys.readouterr().err
 
 
 # --- words ----------------------------------------------------------------------------------------

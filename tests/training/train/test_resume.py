@@ -25,7 +25,7 @@ from tests.support.runs import (
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.train import checkpoint
-from posse_training.train.train import train
+from posse_training.train.train import Run, train
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,7 @@ from posse_training.train.train import train
         ("ppo", {}),
         *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "sac", "td3")),
         ("ppo", GUARDED),
+        ("ppo", {"imitate": "pursuit", "imitate_rounds": 2}),
         ("ppo", TARGET),
         ("ppo", AGAINST),
     ],
@@ -45,6 +46,10 @@ def test_an_interrupted_training_ends_as_an_uninterrupted_one(
     with killed_at(checkpoint, "write_checkpoint", 4):
         train(small(tmp_path / "cut", algorithm, **changes), console=quiet())
     assert 0 < steps_saved(tmp_path / "cut") < steps_saved(tmp_path / "whole")
+    if not changes:
+        with killed_at(Run, "_checkpoint", 2):  # the last one
+            resume(tmp_path / "cut")
+        assert not (tmp_path / "cut/last.safetensors").exists(), "a league takes it for the end"
     resume(tmp_path / "cut")
     assert_equal(numbers(tmp_path / "whole"), numbers(tmp_path / "cut"))
 

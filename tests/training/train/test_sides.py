@@ -1,5 +1,6 @@
 """Training of targets against teams, and of teams against targets."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,8 +53,20 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match=r"(?s)do not fit this run.*hidden"):
         train(replace(second, folder=tmp_path / "third", hidden=(8,)), console=quiet())
     assert not (tmp_path / "third/settings.json").exists()
-    with pytest.raises(SettingsError, match="has activation='tanh', not 'relu'"):
-        train(replace(second, folder=tmp_path / "third", activation="relu"), console=quiet())
+    for other in (replace(second, activation="relu"), small(tmp_path, start=second.start)):
+        with pytest.raises(SettingsError, match=r"has (activation='tanh', not 'relu'|side='target', not 'trackers')"):
+            train(replace(other, folder=tmp_path / "third"), console=quiet())
+    shutil.rmtree(tmp_path / "first")
+    train(second, console=quiet())  # resumed, it needs no start
+
+
+def test_an_opponent_whose_memory_is_not_restored_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    env = make_env(target_run(tmp_path))
+    saved = {name: array.copy() for name, array in env.arrays().items()}
+    env.reset()
+    monkeypatch.setattr(env, "arrays", lambda: {name: array + 1 for name, array in saved.items()})
+    with pytest.raises(ValueError, match="an opponent is not restored"):
+        env.restore(saved)
 
 
 def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:

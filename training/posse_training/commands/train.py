@@ -21,6 +21,7 @@ from posse_training.errors import ClusterError, SettingsError, require
 from posse_training.files import check_held
 from posse_training.options import Names, Ray, words_of
 from posse_training.parallel import all_on_ray, connected
+from posse_training.train.algorithms import check_read
 from posse_training.train.presets import Preset, default_settings
 from posse_training.train.settings import FREE, SETTINGS, TrainSettings, read_settings
 
@@ -72,6 +73,7 @@ def main(arguments: Sequence[str]) -> None:
         args=arguments,
     )
     given = replace(given, reward_weights={**default.reward_weights, **given.reward_weights})
+    check_read(given, default)
     require("training", "torch", "stable_baselines3")
     try:
         paths = train_all(given.runs, given.ray)

@@ -226,7 +226,7 @@ class Comparison:
         for row in self.rows:
             if row["scenario"] == name and best is not None:
                 mine, theirs = self.plays[name, row["policy"]].paired(best)
-                row["of_planner"] = float(mine.mean() / theirs.mean()) if theirs.any() else float("nan")
+                row["of_planner"] = float(mine.mean() / theirs.mean()) if theirs.any() else None
 
     def write(self) -> None:
         """Write summary, export, figures and report."""

@@ -25,8 +25,6 @@ CAPTIONS: Final = {
     "recovery": "Share of teams that have settled again, by time since their leader broke.",
 }
 """What each figure shows, by the name of its file."""
-_BREAKS: Final = "leader-loss"
-"""The scenario whose recovery times are drawn."""
 
 Found = Mapping[tuple[str, str], Plays]
 """Results by scenario and policy."""
@@ -36,14 +34,14 @@ def draw(folder: Path, plays: Found, contenders: Sequence[Contender]) -> list[Pa
     """Draw every figure that there is data for as PNG and SVG; return the files."""
     looks = looks_of([contender.label for contender in contenders])
     curves = curves_of(contenders)
-    losses = [found for (name, _), found in plays.items() if name == _BREAKS]
+    losses = [found for (name, _), found in plays.items() if name == "leader-loss"]
     drawn: dict[str, Figure] = {}
     with mpl.rc_context(RC):
         if plays:
             drawn = {"scenarios": scores(plays, looks), "profile": profile(plays, looks)}
         if curves:
             drawn["learning"] = learning(curves, looks)
-        if losses:
+        if any(np.isfinite(found["recovery_time"]).any() for found in losses):
             drawn["recovery"] = recovery(losses, looks)
         return [path for name, figure in drawn.items() for path in save(figure, folder, name)]
 

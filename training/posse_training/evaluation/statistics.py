@@ -2,9 +2,9 @@
 
 Intervals of means are bootstraps, seeded, so that tables are reproducible. What they resample is a *block* of worlds as
 a whole: of a family ten worlds in a row, which play the same drawn scenario and so say little more of others than one
-of them does; of a scenario each world alone. Of few blocks of a family the percentiles are taken farther out, so that
-the interval of a mean is as wide as Student's t makes it (Hesterberg, What Teachers Should Know about the Bootstrap,
-2015). One block alone has no interval: both ends are its value.
+of them does; of a scenario each world alone. Blocks of a family are few, and percentiles of few values lie too near
+(Hesterberg, What Teachers Should Know about the Bootstrap, 2015): their interval is Student's t times the bootstrap's
+standard deviation. One block alone has no interval: both ends are its value.
 """
 
 from __future__ import annotations
@@ -141,11 +141,11 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
         chosen = (first[:, None] + np.arange(block)).reshape(-1)
         chosen = chosen[chosen < worlds]  # the last block may be short
         drawn[k] = statistic(*(part[np.ix_(rng.integers(len(part), size=len(part)), chosen)] for part in spread))
-    tail = 50 * (1 - LEVEL)
-    if block > 1 and blocks > 1:
-        student = scipy.stats.t.ppf((1 - LEVEL) / 2, blocks - 1)
-        tail = 100 * scipy.stats.norm.cdf(np.sqrt(blocks / (blocks - 1)) * student)
+    found, tail = float(statistic(*parts)), 50 * (1 - LEVEL)
     low, high = np.percentile(drawn, (tail, 100 - tail))
-    if len(parts) == 1:  # no mean of values leaves their range, however the seeds are spread
+    if block > 1 and blocks > 1:  # few: their percentiles would lie too near
+        half = scipy.stats.t.ppf((1 + LEVEL) / 2, blocks - 1) * np.sqrt(blocks / (blocks - 1)) * drawn.std()
+        low, high = found - half, found + half
+    if len(parts) == block == 1:  # no mean of values leaves their range, however the seeds are spread
         low, high = np.clip((low, high), np.nanmin(parts[0]), np.nanmax(parts[0]))
-    return Estimate(float(statistic(*parts)), float(low), float(high), parts[0].size)
+    return Estimate(found, float(low), float(high), parts[0].size)

@@ -78,7 +78,9 @@ class Replay:
 def _identity(world: dict[str, Any]) -> dict[str, Any]:
     """Return the data that are equal if two episodes are of the same world."""
     own = {key: world[key] for key in ("seed", "split", "world", "episode", "obstacles")}
-    return {**world["settings"], **own, "message_size": None}
+    # A target that a person moved is moved so once.
+    moved_by = world.get("moved_by", object()) if world["settings"]["target_motion"] == "agent" else None
+    return {**world["settings"], **own, "message_size": None, "target": moved_by}
 
 
 def join(replays: Sequence[Replay]) -> Replay:
@@ -106,4 +108,6 @@ def join(replays: Sequence[Replay]) -> Replay:
     for replay in replays:
         for entry in replay.world["fields"]:
             fields.setdefault(entry["name"], entry)
-    return Replay({**replays[0].world, "fields": list(fields.values())}, players)
+    options = [replay.world.get("options") for replay in replays]
+    same = options[0] if options.count(options[0]) == len(options) else None
+    return Replay({**replays[0].world, "options": same, "fields": list(fields.values())}, players)

@@ -27,6 +27,7 @@ from posse_training.errors import SettingsError
 from posse_training.replay.episode import Player, Replay
 from posse_training.replay.format import decode, encode
 
+PAGES: Final = (".html", ".htm")
 PROJECT: Final = "https://github.com/posse-benchmark/posse"  # as in pyproject.toml
 TASK_COLOURS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), (0, 114, 178), (0, 158, 115), (240, 228, 66))
 """Of the tasks of a tracker, in the order of ``posse_baselines.ddcs.TASKS``. The last is not Okabe and Ito's pink,
@@ -62,6 +63,12 @@ _CAUSES: Final = ("dart", "contact", "break")
 _MOST: Final = 0.6  # of a difference: the cause of so much is named
 
 
+def check_page(path: Path) -> None:
+    """Raise SettingsError for a path that no page is written to."""
+    if path.suffix.lower() not in PAGES or path.is_dir():
+        raise SettingsError(f"{str(path)!r} must end in .html, since a replay is a web page, and be no folder")
+
+
 def write_replay(replay: Replay, path: str | Path) -> Path:
     """Write a page that shows a replay; folders are made, a file there is replaced as a whole.
 
@@ -73,9 +80,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
         SettingsError: A path that does not end in ``.html``.
         OSError: It could not be written; an old file is unchanged.
     """
-    path = Path(path)
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise SettingsError(f"path={str(path)!r} must end in .html: a replay is a web page")
+    check_page(path := Path(path))
     text = page(replay)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, text.encode())

@@ -64,9 +64,12 @@ def record(
     opponent = None if target is None else load_target(target)
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
-    steps = settings.horizon if seconds is None else max(1, round(seconds / settings.control_step))
+    steps = (
+        settings.horizon if seconds is None else max(1, round(min(seconds, settings.duration) / settings.control_step))
+    )
     options = _options(settings, observations, target=target, world=world, seed=seed, split=split, seconds=seconds)
     place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
+    moved_by = target.name if isinstance(target, Target) else str(target)
     replays = []
     for given in policies:
         label, policy = given if isinstance(given, tuple) else ("", given)
@@ -76,7 +79,7 @@ def record(
             played = rollout(batch, loaded, RECORD, steps=steps)
         one = replay_of(played, label or loaded.name, observations=observations, about=_about(loaded))
         player = replace(one.players[0], argument=policy if isinstance(policy, str) else "")
-        replays.append(Replay(one.world | {"options": options}, (player,)))
+        replays.append(Replay(one.world | {"options": options, "moved_by": moved_by}, (player,)))
     return join(replays)
 
 

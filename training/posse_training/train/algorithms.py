@@ -126,6 +126,16 @@ EVOLUTION: Final = "cmaes"
 """The algorithm that has no model of stable-baselines3 (:mod:`posse_training.evolution`)."""
 
 
+_READ_BY: Final = {
+    "ppo and mappo": "rollout epochs gae_lambda clip entropy value_weight log_deviation final_log_deviation",
+    "sac and td3": "replay learning_starts gradients",
+    "cmaes": "population deviation",
+    "all but cmaes": "reward_weights end_on_contact num_neighbours hidden activation learning_rate "
+    "final_learning_rate discount minibatch checkpoint_every threads family_scenarios",
+}
+"""Settings that only some algorithms read."""
+
+
 def algorithm_of(name: str) -> Algorithm:
     """Return an algorithm by name, or raise SettingsError."""
     if name not in ALGORITHMS:
@@ -164,9 +174,19 @@ def check_algorithm(settings: TrainSettings) -> None:
         raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
 
 
+def check_read(settings: TrainSettings, default: TrainSettings) -> None:
+    """Raise SettingsError for a setting that differs from its default, though the algorithm does not read it."""
+    name, kind = settings.algorithm, ALGORITHMS.get(settings.algorithm)
+    own = [name] if kind is None else ["all but cmaes", "ppo and mappo" if kind.on_policy else "sac and td3"]
+    for group in _READ_BY.keys() - own:
+        for each in _READ_BY[group].split():
+            if (value := getattr(settings, each)) != getattr(default, each):
+                raise SettingsError(f"{each}={value!r} is for {group}, not {name}: leave it out, or change algorithm")
+
+
 def even_minibatch(rows: int, wanted: int) -> int:
     """Return the divisor of ``rows`` that is nearest to ``wanted`` in proportion; SettingsError below two rows."""
     if rows < 2:
         raise SettingsError(f"a rollout of {rows} row is too short to learn from: raise rollout or num_worlds")
-    sizes = [d for k in range(1, int(rows**0.5) + 1) if rows % k == 0 for d in (k, rows // k)]
+    sizes = [d for k in range(1, int(rows**0.5) + 1) if rows % k == 0 for d in (k, rows // k) if d > 1]
     return min(sizes, key=lambda size: max(size / wanted, wanted / size))

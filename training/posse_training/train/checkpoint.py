@@ -62,8 +62,10 @@ def read_checkpoint(folder: Path) -> State:
     return state
 
 
-def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, log_deviation: float) -> None:
-    """Give a model the networks of another run's checkpoint, and its input statistics; optimisers start anew.
+def start_from(
+    folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, inputs: list[str], log_deviation: float
+) -> None:
+    """Give a model the networks of another run's checkpoint, and its statistics of inputs; optimisers start anew.
 
     So does exploration, with ``log_deviation``.
 
@@ -72,11 +74,13 @@ def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics
     """
     state = read_checkpoint(folder)
     try:
+        if state.get("inputs", inputs) != inputs:
+            raise ValueError("they read other fields")
         model.policy.load_state_dict(state["model"]["parts"]["policy"])
         statistics.restore(state["statistics"])
     except (KeyError, RuntimeError, TypeError, ValueError) as error:
         raise RunFolderError(
-            f"the networks in {folder} do not fit this run: {error!s:.300}. Train with its hidden, "
+            f"the networks in {folder} do not fit this run: {error!s:.300}. Train on its scenario, with its hidden, "
             "activation, encoding and algorithm, or leave start out"
         ) from error
     spread = getattr(model.policy, "log_std", None)

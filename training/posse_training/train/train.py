@@ -15,7 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
-from posse_training.errors import DivergedError, RunFolderError, SettingsError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evolution import check_adviser, evolve
 from posse_training.files import check_held, hold_settings, locked, write_csv
 from posse_training.train import checkpoint
@@ -46,8 +46,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
 
     Raises:
         SettingsError, PolicyError: What :func:`check_before` finds.
-        RunFolderError: The folder is in use, holds a run of other settings, or a checkpoint that cannot be read.
-        DivergedError: The networks give numbers that are not finite.
+        RunFolderError: The folder is in use, has other settings or a damaged checkpoint; or the networks diverged.
     """
     check_before(settings)
     folder = settings.run_folder
@@ -76,7 +75,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
             run.restore(saved)
             display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
         hold_settings(folder / SETTINGS, settings.held(), FREE)  # now that it can begin
-        display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
+        display.begin(model.num_timesteps, max(model.num_timesteps, steps_made(settings, env.num_envs)))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
             model.learn(settings.steps - model.num_timesteps, callback=run, reset_num_timesteps=saved is None)
@@ -104,10 +103,16 @@ def check_before(settings: TrainSettings) -> None:
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
             LOAD[settings.side](policy)
+    if (settings.run_folder / checkpoint.CHECKPOINT).exists():
+        return  # what follows is of the start
+    if settings.algorithm in ("sac", "td3") and settings.learning_starts >= settings.steps:
+        raise SettingsError(
+            f"learning_starts={settings.learning_starts} must be below steps={settings.steps}: lower it"
+        )
     if settings.start is not None:
         checkpoint.read_checkpoint(start := Path(settings.start))
         theirs = read_settings(start / SETTINGS)
-        for name in ("activation", "encoding", "safeguard"):
+        for name in ("side", "activation", "encoding", "safeguard"):
             if (value := getattr(theirs, name)) != (own := getattr(settings, name)):
                 raise SettingsError(f"start={settings.start!r} has {name}={value!r}, not {own!r}: set that likewise")
 
@@ -136,7 +141,8 @@ class Run(BaseCallback):
         if s.start is None:
             first_statistics(s, self.statistics)
         else:
-            checkpoint.start_from(Path(s.start), self.model, self.statistics, s.log_deviation)
+            inputs = self.env.encoding.names()
+            checkpoint.start_from(Path(s.start), self.model, self.statistics, inputs, s.log_deviation)
         if s.imitate is not None:
             imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.note)
 
@@ -195,8 +201,8 @@ class Run(BaseCallback):
         self.check_finite()
         if not self.at.curve or self.at.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
-        self._policy().save(self.folder / LAST)
         self._checkpoint()
+        self._policy().save(self.folder / LAST)  # once it is there, a league takes the training for ended
 
     def _evaluate(self) -> None:
         """Evaluate on the validation worlds; keep the policy if it is the best so far."""
@@ -217,6 +223,7 @@ class Run(BaseCallback):
     def _checkpoint(self) -> None:
         state = {
             "worlds": tensors_of(self.env.arrays()),
+            "inputs": self.env.encoding.names(),
             "statistics": self.statistics.save(),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
@@ -236,10 +243,10 @@ class Run(BaseCallback):
         self.display.progress(self.model.num_timesteps, score)
 
     def check_finite(self, cause: Exception | None = None) -> None:
-        """Raise DivergedError where networks hold numbers that are not finite, before they are evaluated or saved."""
+        """Raise RunFolderError where networks hold numbers that are not finite, before they are evaluated or saved."""
         if all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
             return
-        raise DivergedError(
+        raise RunFolderError(
             f"the training diverged at {self.model.num_timesteps:,} steps: its networks give numbers that are not "
             f"finite; the checkpoint and {BEST} of before are kept, if there are any. Lower --learning-rate, or "
             "--log-deviation, and train again in another --out"

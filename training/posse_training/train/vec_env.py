@@ -128,6 +128,8 @@ class TeamVecEnv(VecEnv):
         """
         for name, array in self.arrays().items():
             array[...] = saved[name]
+        if any(array.tobytes() != saved[name].tobytes() for name, array in self.arrays().items()):
+            raise ValueError("an opponent is not restored: its arrays() must return no copies")
         for batch in self.batches:  # which takes the arrays that were written to as running episodes
             batch.restore(Snapshot(batch.scenario, batch.arrays.copy()))
 

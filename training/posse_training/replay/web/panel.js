@@ -80,7 +80,7 @@ function actions(robot) {
   const s = app.world.settings;
   const [speed, turn] = robot === s.num_trackers
     ? [s.target_speed, s.target_turn_rate]
-    : [s.tracker_speed, s.tracker_turn_rate];
+    : [s.tracker_speed, s.tracker_turn_rate].map((limit) => limit[robot] ?? limit); // of each, or of all
   const action = (player, frame) => values(player.columns.get("action"), frame, 2 * robot, 2);
   return section("action", [
     row("speed", "m/s", (player, frame) => number(((action(player, frame)[0] + 1) / 2) * speed),
