@@ -274,13 +274,20 @@ class field(Declaration):  # noqa: N801 (used as a function is)
             raise self.error(f"unknown={empty!r} is not a number {where}")
         return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_neighbour)
 
-    def _bound(self, name: str, scenario: Any) -> float:
-        """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""
-        bound = getattr(self, name)
+    def is_in(self, scenario: Any) -> bool:
+        """Return whether a scenario's observation has the field."""
+        return self.when is None or bool(self._value("when", scenario))
+
+    def _value(self, name: str, scenario: Any) -> Any:
+        value = getattr(self, name)
         try:
-            value = bound(scenario) if callable(bound) else bound
+            return value(scenario) if callable(value) else value
         except Exception as error:  # a user's function
             raise self.error(f"{name} in {scenario.name!r}: {error!r}") from error
+
+    def _bound(self, name: str, scenario: Any) -> float:
+        """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""
+        value = self._value(name, scenario)
         if not is_number(value):
             raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
         return float(value)
@@ -472,7 +479,7 @@ class Declarations(NamedTuple):
         """Return the declarations of a scenario."""
         fields = FIELDS.of(*scenario.extra_fields)
         return cls(
-            tuple(field for field in fields if field.when is None or field.when(scenario)),
+            tuple(field for field in fields if field.is_in(scenario)),
             TARGET_MOTIONS.of(scenario.target_motion),
             SENSORS.of(scenario.sensor),
             METRICS.of(*scenario.metrics),
@@ -487,4 +494,14 @@ class Declarations(NamedTuple):
     @property
     def modules(self) -> list[str]:
         """Names of these modules, which another process has to import."""
-        return sorted({str(plain(each.function).__module__) for each in self.added} - {"__main__"})
+        return _modules_of(self.added)
+
+
+def users_modules() -> list[str]:
+    """Return the names of all modules with declarations of users, which another process has to import."""
+    known = (each for kind in (FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS) for each in kind.values())
+    return _modules_of(each for each in known if not each.built_in)
+
+
+def _modules_of(declared: Iterable[Declaration]) -> list[str]:
+    return sorted({str(plain(each.function).__module__) for each in declared} - {"__main__"})

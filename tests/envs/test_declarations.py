@@ -156,13 +156,15 @@ EXAMPLES = examples("extend.md")
 
 
 def test_another_process_and_a_command_import_a_users_module(tmp_path: Path) -> None:
-    code = """import pickle, posse, subprocess, sys
+    code = """import functools, pickle, posse, subprocess, sys
 from posse_training.cli import main
+from posse_training.parallel import apart
 main("scenarios obstacles --import walls".split())
 scenario = posse.get_scenario("obstacles", extra_fields=["wall_distance"])
 read = "import pickle, sys; print(pickle.load(sys.stdin.buffer).extra_fields)"
-subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check=True)"""
-    assert "('wall_distance',)" in run(tmp_path, code, **EXAMPLES).stdout
+subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check=True)
+print(apart(60.0, functools.partial(posse.get_scenario, "obstacles", extra_fields=["wall_distance"])).extra_fields)"""
+    assert run(tmp_path, code, **EXAMPLES).stdout.count("('wall_distance',)") == 2
 
 
 FIELDS_AND_TERMS = """
@@ -173,8 +175,18 @@ import steady
 import walls
 from tests.support.reference.state import directions, points
 
+@posse.field("m", -1, 500, unknown=-1)
+def field_known(c, v):
+    "It reads a mask of the view, and is named as a column of the next field might be."
+    return posse.numeric.choose(v.target_known, v.target_distance, -1.0)
+
+@posse.field("1", 0, 1)
+def known_0(c, v):
+    "A truth value."
+    return c.num_trackers > 3
+
 settings = dict(
-    extra_fields=("closing_speed", "wall_distance"),
+    extra_fields=("closing_speed", "wall_distance", "field_known", "known_0"),
     target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
     num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
@@ -195,6 +207,7 @@ for step in range(60):
     speed = np.column_stack([batch.state["tracker_speed"], batch.state["world_speed"]])
     wall = s.arena / 2 - s.robot_radius - np.maximum(abs(place.real), abs(place.imag))
     np.testing.assert_allclose(o["wall_distance"], wall, rtol=1e-5, atol=1e-5)
+    assert (o["field_known"] == o["target_range"]).all() and (o["known_0"] == 1).all()
     velocity = speed * heading
     for i in range(5):
         number = o["neighbour_number"][:, i].astype(int)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import hashlib
+import importlib
 import io
 import operator
 import os
@@ -27,6 +28,7 @@ import cloudpickle
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import users_modules
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code
 from posse_training.errors import ClusterError, PlayError, TimeLimitError, require
@@ -64,7 +66,7 @@ def apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
         done = subprocess.run(
             [sys.executable, "-c", f"from {__name__} import _answer; _answer()"],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            input=cloudpickle.dumps((limit, function, arguments)),
+            input=cloudpickle.dumps((limit, installed(), users_modules(), function, *arguments)),
             stdout=subprocess.PIPE,
             timeout=limit + _GRACE,
             check=False,
@@ -81,16 +83,12 @@ def apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
 
 def _answer() -> None:
     """Compute what the standard input asks for, and write it, or the error, to the standard output."""
-    limit, function, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
+    limit, *call = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
     with os.fdopen(os.dup(1), "wb") as found, Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)  # what a policy prints is no part of the answer
         # A hanging policy does not outlive a parent that was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
-        try:
-            value = function(*arguments)
-        except Exception as error:
-            value = error
-        found.write(cloudpickle.dumps(value))
+        found.write(cloudpickle.dumps(_work(*call)))
 
 
 # --- a Ray cluster --------------------------------------------------------------------------------
@@ -141,7 +139,8 @@ def on_ray(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> It
     import ray
 
     task = ray.remote(num_cpus=1, max_retries=RETRIES)(_work)
-    running = {task.remote(function, installed(), *call): k for k, call in enumerate(calls)}
+    modules = users_modules()
+    running = {task.remote(installed(), modules, function, *call): k for k, call in enumerate(calls)}
     try:
         while running:
             ready, _ = ray.wait(list(running))
@@ -167,12 +166,17 @@ def all_on_ray(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -
     return [results[k] for k in range(len(calls))]
 
 
-def _work(function: Callable[..., Any], expected: str, *arguments: Any) -> Any:
-    """Return the result of a function, or the exception that it raised: Ray prints those that it is told of."""
+def _work(expected: str, modules: Sequence[str], function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the result of a function, or the exception that it raised: Ray prints those that it is told of.
+
+    Modules with declarations of users are imported first.
+    """
     if installed() != expected:
         what = f"node {platform.node()} has {installed()}, and the driver {expected}"
         return ClusterError(f"{what}: install the same on all nodes")
     try:
+        for module in modules:
+            importlib.import_module(module)
         return function(*arguments)
     except Exception as error:
         return error

@@ -47,7 +47,7 @@ class LanesType(types.Type):
         """Convert a number to eight copies of itself (numba's interface)."""
         if other == types.float32:
             return Conversion.safe
-        return Conversion.unsafe if isinstance(other, (types.Float, types.Integer)) else None
+        return Conversion.unsafe if isinstance(other, (types.Float, types.Integer, types.Boolean)) else None
 
 
 class MaskType(types.Type):
@@ -63,8 +63,8 @@ register_model(MaskType)(lambda manager, kind: models.PrimitiveModel(manager, ki
 
 def tuple_of_lanes(kind: type) -> types.NamedTuple:
     """Return numba's type of a named tuple whose fields are declared as Lanes or Mask."""
-    fields = kind.__annotations__.values()
-    return types.NamedTuple([_MASK if each == "Mask" else _LANES for each in fields], kind)
+    fields = kind.__annotations__.values()  # names in forward references
+    return types.NamedTuple([_MASK if "Mask" in str(each) else _LANES for each in fields], kind)
 
 
 def _key(function: Callable[..., Any]) -> Any:
@@ -133,6 +133,7 @@ def _shuffle(builder: Any, value: Any, other: Any, places: list[int]) -> Any:
     return builder.shuffle_vector(value, other, ir.Constant(_INTEGERS, places))
 
 
+@lower_cast(types.Boolean, LanesType)
 @lower_cast(types.Float, LanesType)
 @lower_cast(types.Integer, LanesType)
 def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:

@@ -248,13 +248,14 @@ def world_record(declared: Declarations) -> np.dtype[Any]:
     Raise DeclarationError if a memory has the name of another field.
     """
     sums: dict[str, Any] = {metric.sum_name: np.float64 for metric in declared.metrics if metric.summed}
-    fields = {**dict(_WORLD), **sums}
+    memories: dict[str, Any] = {}
     for motion in declared.motions:
         for memory in motion.memory:
-            if memory in fields:
+            if memory in {**dict(_WORLD), **sums, **memories}:
                 raise motion.error(f"a world has a field {memory!r}: choose another name for this memory")
-            fields[memory] = _F
-    return record_type(*fields.items())
+            memories[memory] = _F
+    # Those of users before the built-in ones: numba warns of a record that another one begins with.
+    return record_type(*_WORLD, *reversed(memories.items()), *reversed(sums.items()))
 
 
 FIX_RECORD: Final = record_type(*((name, _F) for name in Fix._fields))

@@ -115,7 +115,7 @@ class _Module:
         width = _size(fields)
         blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]  # the last one repeats columns of the one before
         for each in fields:
-            mine = [f"{each.name}_{q}" for q in range(each.size)]
+            mine = [f"column_{each.name}_{q}" for q in range(each.size)]
             yield f"{', '.join(mine)} = {self._call(f'field_{each.name}', each.function)}"
             if "v" not in parameters_of(each.function):  # a constant
                 yield from (f"{column} = eight(float32({column}))" for column in mine)
@@ -146,9 +146,9 @@ class _Module:
         for each in metrics:
             value = self._call(f"metric_{each.name}", each.function)
             if "t" in parameters_of(each.function):
-                yield f"{each.name}_total = ZERO"
-                loop.append(f"    {each.name}_total += {value}")
-                value = f"{each.name}_total"
+                yield f"total_{each.name} = ZERO"
+                loop.append(f"    total_{each.name} += {value}")
+                value = f"total_{each.name}"
             after.append(f"w.{each.sum_name} += {value}")
         yield from ("for i in range(c.num_trackers):", *(f"    {line}" for line in loop), *after)
 

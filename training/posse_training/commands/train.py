@@ -15,8 +15,7 @@ import tyro
 from rich.console import Console
 
 from posse import family_names
-from posse.declarations import Declarations
-from posse.scenarios.family import scenario_or_family
+from posse.declarations import users_modules
 from posse_training.errors import ClusterError, SettingsError, require
 from posse_training.files import check_held
 from posse_training.options import Names, Ray, words_of
@@ -125,9 +124,7 @@ def _what_next(path: Path) -> str:
     elif opponents:
         target = f" --target {opponents[-1]}"
     changed = f" --set {shlex.join(words_of(run.overrides))}" if run.overrides else ""
-    played = scenario_or_family(scenario).replace(**run.overrides)
-    modules = Declarations.of(getattr(played, "base", played)).modules
-    where = f"--scenario {scenario}{target}{changed}{''.join(f' --import {module}' for module in modules)}"
+    where = f"--scenario {scenario}{target}{changed}{''.join(f' --import {module}' for module in users_modules())}"
     lines = [f"watch {watched} {where}", f"compare {teams} {where}", f"replay {teams} {where} --out {page}"]
     shown = lines[1:2] if scenario in family_names() else lines  # watch and replay show one scenario
     return "\n".join([f"{path}\nnext:", *(f"  posse {line}" for line in shown)])
