@@ -93,7 +93,7 @@ class Search(OwnArrays):
         for _ in range(delay):
             self._later.arrays.world["over"] = 0  # one that has ended goes on, and draws no start
             self._later.step(unread)
-        late = self.batch.arrays.world["step"] >= self.batch.scenario.horizon
+        late = self.batch.arrays.world["step"] >= self.batch.scenario.horizon  # robots may go on
         self._later.arrays.world["over"][late] = self.batch.arrays.world["over"][late]
         return self._later
 

@@ -69,7 +69,7 @@ class Command(NamedTuple):
     turn_rate: float
     """rad/s, positive to the left."""
     message: tuple[float, ...]
-    """For its broadcasts after the next observation: of a step earlier than the pose, as a tracker's."""
+    """What its broadcasts say from the next observation on, as a tracker's."""
 
 
 class Robot:
@@ -200,10 +200,8 @@ class Robot:
         self._said = tuple(said)
         s, turn_rate = self.scenario, turn * self.scenario.tracker_turn_rates[self.number]
         most = s.tracker_speeds[self.number]
-        speed = min(
-            (forward + 1) / 2 * most, max(0.0, most - 0.5 * s.wheel_base * abs(turn_rate))
-        )  # as rules.motion.obey
-        return Command(speed / self.scale, turn_rate, self._said)
+        left = max(0.0, most - 0.5 * s.wheel_base * abs(turn_rate))  # by the turn, as in posse.rules.motion
+        return Command(min((forward + 1) / 2 * most, left) / self.scale, turn_rate, self._said)
 
     def broadcast(self) -> Heard:
         """Return what team-mates should hear of it now: its last measurements, and what its policy said before."""

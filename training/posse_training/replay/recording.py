@@ -64,9 +64,8 @@ def record(
     opponent = None if target is None else load_target(target)
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
-    steps = (
-        settings.horizon if seconds is None else max(1, round(min(seconds, settings.duration) / settings.control_step))
-    )
+    longest = settings.duration if seconds is None else min(seconds, settings.duration)
+    steps = max(1, round(longest / settings.control_step))
     options = _options(settings, observations, target=target, world=world, seed=seed, split=split, seconds=seconds)
     place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
     moved_by = target.name if isinstance(target, Target) else str(target)
