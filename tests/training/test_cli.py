@@ -69,7 +69,6 @@ INVALID = {
     "compare pursuit --target smrat": "unknown target 'smrat' (did you mean 'smart'",
     "replay": "1 to 4 players, got 0: give at least one policy",
     "replay none.html --seed 3": "all are replays: leave out the options other than --out",
-    "replay idle --seconds nan": "seconds=nan must be above 0",
     "watch idle --out film.gif --speed 1e-5": "too low for a GIF",
     "train --scenario search --discount 0.1": "discount=0.1 is for all but cmaes, not cmaes: leave",
     "train --algorithm sac --steps 10_000": "learning_starts=20000 must be below steps=10000",

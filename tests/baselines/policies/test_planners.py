@@ -69,8 +69,7 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
 
 
 @pytest.mark.parametrize("delay", [0, 2])
-def test_it_plans_beyond_the_end_of_an_episode(delay: int) -> None:
-    """As a robot may, which goes on."""
+def test_it_plans_beyond_the_end_of_an_episode(delay: int) -> None:  # as a robot may, which goes on
     actions = []
     for horizon in (50, 600):
         batch = posse.batch("smart", 3, horizon=horizon, settle_time=1.0, command_delay=delay)
