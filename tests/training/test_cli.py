@@ -70,7 +70,7 @@ INVALID = {
     "replay": "1 to 4 players, got 0: give at least one policy",
     "replay none.html --seed 3": "all are replays: leave out the options other than --out",
     "watch idle --out film.gif --speed 1e-5": "too low for a GIF",
-    "train --scenario search --discount 0.1": "discount=0.1 is for all but cmaes, not cmaes: leave",
+    "train --scenario search --discount 0.1": "discount=0.1 is for ppo, mappo, sac and td3, not cmaes",
     "train --algorithm sac --steps 10_000": "learning_starts=20000 must be below steps=10000",
     "replay none.html": "cannot read a replay from none.html",
     "replay idle --set target_motion=agent": "the target of 'smart' is an agent",

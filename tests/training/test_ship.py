@@ -1,17 +1,20 @@
 """Shipping: the best of several training seeds, with the scores of all."""
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tyro
 from scripts.ship import CHOICE_SEED, Settings, replay, ship
 from tests.support.runs import quiet, small
 
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.leaderboard import SEED
+from posse_training.train import TrainSettings, default_settings
 from posse_training.train.train import train
 
 SETTINGS = small(Path(), steps=640, team_sizes=(2, 3), hidden=(8,), evaluate_every=320, evaluate_worlds=2)
@@ -47,3 +50,5 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(tmp_path: Path) -> None:
     assert all(play["settings"]["horizon"] == 40 for play in check["plays"])
     assert replay(shipped, check) == [play["score"] for play in check["plays"]]
     assert str(runs[0].parent) not in json.dumps(shipped.card)
+    default, words = default_settings("constant", "ppo"), shlex.split(shipped.card["command"])[2:]
+    assert tyro.cli(TrainSettings, default=default, args=words) == replace(SETTINGS, seed=best + 1, folder=None)

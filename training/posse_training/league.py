@@ -231,7 +231,7 @@ class League:
 
         For a team 1 less its safe score; for a target the team's score.
         """
-        seed, worlds = 1, 32
+        seed, worlds = 1, 32  # of the validation worlds
         if side == TARGET:
             return float(self._play(other, own, worlds, seed, "validation")["score"].mean())
         return 1 - float(self._play(own, other, worlds, seed, "validation")["safe_score"].mean())

@@ -145,7 +145,6 @@ def test_noisy_fixes_are_filtered() -> None:
     played = rollout(batch, policy, ["annotations", "target_pose"], steps=30)
     away = np.abs(played["annotation/estimate"][..., :2] - played["target_pose"][:-1, :, None, :2]).max(axis=-1)
     assert np.median(away[10:]) < 0.3 * np.median(away[0])
-    memory = begin(policy, batch)
-    policy.act(batch.reset(), memory)
+    _, memory = policy.act(batch.reset(), begin(policy, batch))
     assert np.isfinite(memory.now.observe()).all(), "as worlds of a user's own motion must be"
     believed(batch.scenario.replace(arena=990.0, start_distance=(1.0, 1000.0)))  # the widest that is allowed

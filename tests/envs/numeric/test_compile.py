@@ -142,8 +142,7 @@ def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(t
     assert said.count("\n") == 1
     assert "compiling kernels" in said
     assert play((first, cache)) == ([[printed[0], "True", "1"]], "")
-    folders = [write(tmp_path / what, *edit) for what, edit in EDITS.items()]
-    played, _ = play(*((folder, cache) for folder in folders))
+    played, _ = play(*((write(tmp_path / what, *edit), cache) for what, edit in EDITS.items()))
     hits = {what: printed[1:] for what, printed in zip(EDITS, played, strict=True)}
     assert hits == {what: ["True", "1" if "not reach" in what else "0"] for what in EDITS}
 
@@ -162,8 +161,7 @@ def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
         cache.mkdir()
         (cache / path.name).write_bytes(damaged)
     for hits in "01":
-        played, _ = play(*((mine[0], cache) for cache in caches))
-        assert [printed[1:] for printed in played] == [["True", hits]] * 3
+        assert [printed[1:] for printed in play(*((mine[0], cache) for cache in caches))[0]] == [["True", hits]] * 3
 
 
 def test_processes_share_a_folder(tmp_path: Path) -> None:

@@ -126,11 +126,12 @@ EVOLUTION: Final = "cmaes"
 """The algorithm that has no model of stable-baselines3 (:mod:`posse_training.evolution`)."""
 
 
+_GRADIENT: Final = "ppo, mappo, sac and td3"
 _READ_BY: Final = {
     "ppo and mappo": "rollout epochs gae_lambda clip entropy value_weight log_deviation final_log_deviation",
     "sac and td3": "replay learning_starts gradients",
     "cmaes": "population deviation",
-    "all but cmaes": "reward_weights end_on_contact num_neighbours hidden activation learning_rate "
+    _GRADIENT: "reward_weights end_on_contact num_neighbours hidden activation learning_rate "
     "final_learning_rate discount minibatch checkpoint_every threads family_scenarios",
 }
 """Settings that only some algorithms read."""
@@ -177,8 +178,8 @@ def check_algorithm(settings: TrainSettings) -> None:
 def check_read(settings: TrainSettings, default: TrainSettings) -> None:
     """Raise SettingsError for a setting that differs from its default, though the algorithm does not read it."""
     name, kind = settings.algorithm, ALGORITHMS.get(settings.algorithm)
-    own = [name] if kind is None else ["all but cmaes", "ppo and mappo" if kind.on_policy else "sac and td3"]
-    for group in _READ_BY.keys() - own:
+    own = [name] if kind is None else [_GRADIENT, "ppo and mappo" if kind.on_policy else "sac and td3"]
+    for group in [group for group in _READ_BY if group not in own]:
         for each in _READ_BY[group].split():
             if (value := getattr(settings, each)) != getattr(default, each):
                 raise SettingsError(f"{each}={value!r} is for {group}, not {name}: leave it out, or change algorithm")

@@ -104,11 +104,10 @@ def check_before(settings: TrainSettings) -> None:
         if policy is not None:
             LOAD[settings.side](policy)
     if (settings.run_folder / checkpoint.CHECKPOINT).exists():
-        return  # what follows is of the start
-    if settings.algorithm in ("sac", "td3") and settings.learning_starts >= settings.steps:
-        raise SettingsError(
-            f"learning_starts={settings.learning_starts} must be below steps={settings.steps}: lower it"
-        )
+        return  # the run goes on: what follows is about its beginning
+    kind, first = ALGORITHMS.get(settings.algorithm), settings.learning_starts
+    if kind is not None and not kind.on_policy and first >= settings.steps:
+        raise SettingsError(f"learning_starts={first} must be below steps={settings.steps}: lower it")
     if settings.start is not None:
         checkpoint.read_checkpoint(start := Path(settings.start))
         theirs = read_settings(start / SETTINGS)
