@@ -1,13 +1,20 @@
 """A page of the README or the manual as a script: its Python and the lines of its shell, in order."""
 
+import contextlib
+import functools
 import re
 import shlex
 import shutil
 import subprocess
 import sys
 import textwrap
+import threading
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
+
+from posse_training.cli import main
 
 ROOT = Path(__file__).parents[2]
 PAGES = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
@@ -16,22 +23,6 @@ PROGRAMS = ("posse", "make", "python", "pip", "ray")
 SHIPPED = ROOT / "baselines/posse_baselines/shipped"
 FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 _INLINE = re.compile(r"`((?:posse|make|python) [^`]+)`")
-# Closes every window after half a second, as a reader would some time. Pygame may be missing, half imported, or
-# without a window.
-_POSSE = """
-import sys, threading, time
-from posse_training.cli import main
-def close():
-    while True:
-        time.sleep(0.5)
-        pygame = sys.modules.get("pygame")
-        try:
-            pygame.event.post(pygame.event.Event(pygame.QUIT))
-        except (AttributeError, RuntimeError):  # pygame.error is one
-            pass
-threading.Thread(target=close, daemon=True).start()
-sys.exit(main(sys.argv[1:]))
-"""
 
 
 def shell_lines(text: str) -> list[str]:
@@ -104,11 +95,34 @@ def provide(name: str) -> None:
 
 def sh(program: str, *words: str) -> None:
     """Run a command of a page; make only says what it would do, since it installs everything."""
+    if program == "posse":
+        run_posse(*words)
+        return
     commands = {
         "make": ["make", "--dry-run", "--directory", str(ROOT), *words],
-        "posse": [sys.executable, "-c", _POSSE, *words],
         "python": [sys.executable, *(str(ROOT / word) if word.endswith(".py") else word for word in words)],
     }
-    while words[:1] == ("train",) and PROVIDED:  # which does not write where files of no run are
-        PROVIDED.pop().unlink()
     subprocess.run(commands[program], check=True)
+
+
+def run_posse(*words: str) -> None:
+    """Run a command in this process, which has imported what it needs."""
+    close_windows()
+    while words[0] == "train" and PROVIDED:  # which does not write where files of no run are
+        PROVIDED.pop().unlink()
+    if ended := main(list(words)):
+        raise SystemExit(ended)
+
+
+@functools.cache
+def close_windows() -> None:
+    """From now on close every window after half a second, as a reader would some time."""
+    threading.Thread(target=_close_windows, daemon=True).start()
+
+
+def _close_windows() -> None:
+    while True:
+        time.sleep(0.5)
+        pygame: Any = sys.modules.get("pygame")
+        with contextlib.suppress(AttributeError, RuntimeError):  # missing, half imported, or without a window
+            pygame.event.post(pygame.event.Event(pygame.QUIT))

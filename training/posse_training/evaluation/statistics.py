@@ -18,6 +18,7 @@ import numpy.typing as npt
 import scipy  # its parts are imported when they are used: scipy.stats takes a second
 
 RESAMPLES: Final = 2000
+_AT_ONCE: Final = 100
 LEVEL: Final = 0.95
 
 Values = npt.NDArray[np.float64]
@@ -47,13 +48,12 @@ def mean(values: npt.ArrayLike, block: int = 1) -> Estimate:
     if not known.any():
         return Estimate(np.nan, np.nan, np.nan, 0)
     kept = np.where(known, blocks, np.nan)[known.any(axis=1)].reshape(1, -1)
-    statistic = np.nanmean if np.isnan(kept).any() else np.mean  # the one takes several times as long as the other
-    return replace(_resample((kept,), statistic, block), count=int(known.sum()))
+    return replace(_resample((kept,), np.nanmean, block), count=int(known.sum()))
 
 
-def middle_mean(sample: Values) -> Any:
+def middle_mean(samples: Values, axis: int) -> Any:
     """Return the mean of the middle half."""
-    return scipy.stats.trim_mean(sample, 0.25, axis=None)
+    return scipy.stats.trim_mean(samples, 0.25, axis)
 
 
 def share(happened: npt.ArrayLike) -> Estimate:
@@ -97,7 +97,7 @@ def difference(first: npt.ArrayLike, second: npt.ArrayLike, block: int = 1) -> E
     mine, theirs = _paired(first, second)
     if len(mine) == len(theirs) == 1:
         return mean(mine[0] - theirs[0], block)
-    return _resample((mine, theirs), lambda a, b: a.mean() - b.mean(), block)
+    return _resample((mine, theirs), lambda a, b, axis: a.mean(axis) - b.mean(axis), block)
 
 
 def improvement(first: npt.ArrayLike, second: npt.ArrayLike, block: int = 1) -> Estimate:
@@ -126,8 +126,9 @@ def _seeds_by_worlds(values: npt.ArrayLike) -> Values:
 
 
 def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Estimate:
-    """Return a statistic of parts (S, W): each has its own seeds, all have the same worlds."""
+    """Return a statistic, of an axis, of parts (S, W): each has its own seeds, all have the same worlds."""
     worlds = parts[0].shape[1]
+    block = min(block, worlds)
     blocks = -(-worlds // block)
     spread = []
     for part in parts:
@@ -135,13 +136,14 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
         wider = np.sqrt(seeds / (seeds - 1)) if seeds > 1 else 1.0
         spread.append(part + (wider - 1) * (means - means.mean()))
     rng = np.random.default_rng(0)
-    drawn = np.empty(RESAMPLES)
-    for k in range(RESAMPLES):
-        first = block * rng.integers(blocks, size=blocks)
-        chosen = (first[:, None] + np.arange(block)).reshape(-1)
-        chosen = chosen[chosen < worlds]  # the last block may be short
-        drawn[k] = statistic(*(part[np.ix_(rng.integers(len(part), size=len(part)), chosen)] for part in spread))
-    found, tail = float(statistic(*parts)), 50 * (1 - LEVEL)
+    drawn = np.empty((RESAMPLES // _AT_ONCE, _AT_ONCE))
+    for row in drawn:
+        first = block * rng.integers(blocks, size=(_AT_ONCE, blocks, 1))
+        chosen = first + np.arange(block) % (worlds - first)  # the worlds of a short last block are repeated
+        seeds = [rng.integers(len(part), size=(_AT_ONCE, len(part), 1)) for part in spread]
+        samples = (part[s, chosen.reshape(_AT_ONCE, 1, -1)] for part, s in zip(spread, seeds, strict=True))
+        row[:] = statistic(*(sample.reshape(_AT_ONCE, -1) for sample in samples), axis=-1)
+    found, tail = float(statistic(*(part.reshape(-1) for part in parts), axis=-1)), 50 * (1 - LEVEL)
     low, high = np.percentile(drawn, (tail, 100 - tail))
     if block > 1 and blocks > 1:  # few: their percentiles would lie too near
         half = scipy.stats.t.ppf((1 + LEVEL) / 2, blocks - 1) * np.sqrt(blocks / (blocks - 1)) * drawn.std()
