@@ -29,6 +29,7 @@ from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infe
 from posse.numeric.arrays import FloatArray, Record
 
 WIDTH: Final = 8
+_PLACES: Final = np.arange(WIDTH)
 ALL: Final = 2**WIDTH - 1
 """The :func:`bits` of a mask that is true everywhere."""
 
@@ -269,14 +270,13 @@ def _prefetch(builder: Any, address: Any) -> Any:
 @_accesses(_read, types.Array, _LANES)
 def load(array: FloatArray, index: int) -> Lanes:
     """Return the eight numbers from ``index`` on, which must not be negative."""
-    return np.array([array[index + k] for k in range(WIDTH)], np.float32)
+    return array[index + _PLACES]
 
 
 @_accesses(_write, types.Array, types.none, _LANES)
 def store(array: FloatArray, index: int, value: Lanes) -> None:
     """Write eight numbers from ``index`` on."""
-    for k, number in enumerate(np.broadcast_to(value, WIDTH)):
-        array[index + k] = number
+    array[index + _PLACES] = value
 
 
 @_accesses(_prefetch, types.Array, types.none)

@@ -256,10 +256,10 @@ def observe_together(
 def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
     first, end, i, now = observers
-    n, places = c.num_trackers, c.neighbours
+    n, places, placed, placed_at = c.num_trackers, c.neighbours, s.placed, s.placed_at
     for p in range(places):
-        store(s.placed[p], 0, eight(-ONE))
-        store(s.placed_at[p], 0, eight(FAR))
+        store(placed[p], 0, eight(-ONE))
+        store(placed_at[p], 0, eight(FAR))
     if places == 0:
         return
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
@@ -274,13 +274,13 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
         ahead, left = ego(v, x - v.x, y - v.y)
         number = choose(known, np.float32(j), -ONE)
         distance = choose(known, root(ahead * ahead + left * left), FAR)
-        if bits(distance <= load(s.placed_at[places - 1], 0)) == 0:
+        if bits(distance <= load(placed_at[places - 1], 0)) == 0:
             continue
         for p in range(min(n - j, places)):
-            other, whose = load(s.placed_at[p], 0), load(s.placed[p], 0)
+            other, whose = load(placed_at[p], 0), load(placed[p], 0)
             nearer = distance <= other
-            store(s.placed[p], 0, choose(nearer, number, whose))
-            store(s.placed_at[p], 0, lesser(other, distance))
+            store(placed[p], 0, choose(nearer, number, whose))
+            store(placed_at[p], 0, lesser(other, distance))
             number, distance = choose(nearer, whose, number), greater(other, distance)
 
 
