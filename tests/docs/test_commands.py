@@ -4,8 +4,10 @@ A page is followed from top to bottom in an empty folder, its Python and its she
 on Ray only where it is installed, since ``tests/training/cluster`` has them.
 """
 
+import contextlib
 import functools
 import importlib.util
+import io
 import re
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import pytest
 from tests.support.pages import PAGES, ROOT, blocks, named, script_of
 from tests.support.process import printed
 
-from posse_training.cli import COMMANDS
+from posse_training.cli import COMMANDS, main
 
 NOT_RUN = {
     "pip install": "it changes the environment: tests/package installs the wheel into an empty one",
@@ -71,8 +73,9 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
 def help_of(command: str) -> str:
     if command not in COMMANDS:
         return ""
-    code = f"from posse_training.cli import main; main([{command!r}, '--help'])"
-    return printed("-c", code)
+    with contextlib.redirect_stdout(io.StringIO()) as shown, pytest.raises(SystemExit, match="0"):
+        main([command, "--help"])
+    return shown.getvalue()
 
 
 @pytest.mark.parametrize("page", [page for page in sorted(PAGES) if named(page)])

@@ -92,11 +92,11 @@ def test_a_policy_that_fails_or_kills_its_workers_is_named(nodes: Cluster, folde
         evaluate(Watched(folder, "die always"), "smart", 1, **THERE)
 
 
-COMPARE = "--episodes 3 --planner-episodes 1 --no-figures"
+COMPARE = "--episodes 3 --no-figures --planner-episodes"
 COMMANDS = {
-    f"compare idle learned-smart --scenario smart constant {COMPARE}": "summary.json",
-    f"compare idle tests.support.bad_policies:Crashes --scenario constant {COMPARE}": "constant-idle.csv",
-    f"compare idle --target evader --scenario duel {COMPARE}": "summary.json",
+    f"compare idle learned-smart --scenario smart constant {COMPARE} 0": "summary.json",
+    f"compare idle tests.support.bad_policies:Crashes --scenario constant {COMPARE} 1": "constant-idle.csv",
+    f"compare idle --target evader --scenario duel {COMPARE} 0": "summary.json",
     "tune pngl-l-phi --scenario constant --only gain near --population 4 --worlds 2 --generations 2": "tuned.json",
 }
 

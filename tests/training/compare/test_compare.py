@@ -117,7 +117,7 @@ def test_a_policy_that_cannot_play_is_left_out_with_a_line(
 
 @pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenario", "constant", "leader-loss", "--episodes", "3"]
+    options = ["--scenario", "constant", "leader-loss", "--episodes", "3", "--planner-episodes", "1"]
     for folder, changed in ((tmp_path / "lost", []), (tmp_path / "none", ["breaks=0", "num_trackers=1", "horizon=30"])):
         assert main(["compare", "pursuit", *options, "--replays", "0", "--out", str(folder), "--set", *changed]) == 0
         for suffix in ("png", "svg"):
