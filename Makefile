@@ -9,10 +9,8 @@ PINS := pyproject.toml constraints.txt
 BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+# Half of the modules are never imported; Python compiles the others when they are.
 INSTALL := install --no-compile --constraint
-# pip compiles modules on one core; this does on all. Left out is what the tests hardly import: others' tests,
-# torch's compiler, and tools. One module of torch is for another Python.
-COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone. AgileRL's pins
@@ -24,7 +22,7 @@ AGILERL := .venv-agilerl
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests kernels test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -33,7 +31,12 @@ demo: $(BASE) ## Show teams in action; installs only the base packages, without 
 	$(BIN)/posse demo
 
 test: $(FULL) ## Run all checks but the long tests: lint, types, tests, docs
-	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
+	$(MAKE) --no-print-directory --jobs 2 lint kernels
+	$(MAKE) --no-print-directory quick-tests
+
+# Else each process of the tests would compile them.
+kernels: $(FULL)
+	$(BIN)/python -c "from posse_training import evaluate; evaluate('ddcs-tuned', 'smart', 1)"
 
 # They build the manual, too.
 quick-tests: $(FULL)
@@ -98,12 +101,10 @@ $(BIN)/python:
 
 $(BASE): $(PINS) | $(BIN)/python
 	$(PIP) $(INSTALL) constraints.txt --editable .
-	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $@
 
 $(FULL): $(PINS) | $(BIN)/python
 	$(PIP) $(INSTALL) constraints.txt --editable '.[training,dev,docs]'
-	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $(BASE) $@
 
 define BESIDE
@@ -121,7 +122,6 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps \
 		pufferlib gym gym-notices robotarium-python-simulator
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
-	@$(RECIPES)/bin/$(COMPILE) $(RECIPES)/lib || true
 	@touch $@
 
 $(AGILERL)/recipes.stamp: constraints-recipes.txt $(FULL)

@@ -78,7 +78,7 @@ def in_the_largest_arena(speed: float, radius: float) -> dict[str, Any]:
     }
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(name=st.sampled_from(posse.scenario_names()), changes=SETTINGS, crowds=st.booleans(), seed=st.integers(0, 1000))
 @example(name="obstacles", changes={"target_turn_rate": 0.6, "arena": 16.0, **CROWDED}, crowds=True, seed=7)
 @example(name="constant", changes=in_the_largest_arena(17.0, 0.4), crowds=True, seed=3)
