@@ -140,8 +140,8 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
     for row in drawn:
         first = block * rng.integers(blocks, size=(_AT_ONCE, blocks, 1))
         chosen = first + np.arange(block) % (worlds - first)  # the worlds of a short last block are repeated
-        seeds = [rng.integers(len(part), size=(_AT_ONCE, len(part), 1)) for part in spread]
-        samples = (part[s, chosen.reshape(_AT_ONCE, 1, -1)] for part, s in zip(spread, seeds, strict=True))
+        whose = [rng.integers(len(part), size=(_AT_ONCE, len(part), 1)) for part in spread]
+        samples = (part[s, chosen.reshape(_AT_ONCE, 1, -1)] for part, s in zip(spread, whose, strict=True))
         row[:] = statistic(*(sample.reshape(_AT_ONCE, -1) for sample in samples), axis=-1)
     found, tail = float(statistic(*(part.reshape(-1) for part in parts), axis=-1)), 50 * (1 - LEVEL)
     low, high = np.percentile(drawn, (tail, 100 - tail))
