@@ -36,7 +36,7 @@ test: $(FULL) ## Run all checks but the long tests: lint, types, tests, docs
 
 # Else each process of the tests would compile them.
 kernels: $(FULL)
-	$(BIN)/python -c "from posse_training import evaluate; evaluate('ddcs-tuned', 'smart', 1)"
+	$(BIN)/python -c "from posse_training import evaluate; [evaluate('ddcs-tuned', 'smart', 1, arena=arena) for arena in (20.0, (30.0, 20.0))]"
 
 # They build the manual, too.
 quick-tests: $(FULL)
