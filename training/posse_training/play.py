@@ -55,7 +55,7 @@ def main(arguments: Sequence[str]) -> None:
         raise SettingsError(f"--as {which.robot} is no robot; there are: {', '.join(robots)}")
     rounds, page = play(load(which.policy), scenario, robots.index(which.robot), which.size, **which.place)
     if rounds:
-        print(f"{len(rounds)} rounds, best {max(rounds):.0f} points")
+        print(f"rounds: {len(rounds)}, best: {max(rounds):.0f} points")
     if page is None:
         print("Nothing was played: no replay is written.")
         return

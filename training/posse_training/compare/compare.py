@@ -324,7 +324,7 @@ def _facts(settings: Settings) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare policies, print the table, and return 1 if a policy failed, else 0."""
+    """Compare policies, print the table, and return 1 if a policy failed or none played, else 0."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
     found = compare(settings)
     console = Console()
@@ -337,4 +337,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if settings.figures:
         page = found.folder / REPORT
         console.print(f"all of it, to open in a browser: {page}", markup=False, soft_wrap=True)
-    return 1 if found.failed else 0
+    return 1 if found.failed or not found.rows else 0
