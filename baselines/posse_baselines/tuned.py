@@ -74,7 +74,8 @@ def read_tuned(path: Path) -> TunedDDCS:
         if card["format"] != FORMAT:
             raise ValueError(f"it must have format={FORMAT!r}")
         if policy not in FAMILY:
-            raise ValueError(unknown("policy with settings", policy, FAMILY))
+            own = "; a policy of your own has them by with_settings(**settings)"
+            raise ValueError(unknown("policy with settings", policy, FAMILY) + own)
         known = [tunable.name for tunable in tunables(FAMILY[policy])]
         for name in values:
             if name not in known:

@@ -16,7 +16,7 @@ from scipy import stats
 
 import standings
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.registry import shipped
+from posse_baselines.registry import policy_names, shipped
 from posse_training.leaderboard import Standing
 
 README: Final = Path(__file__).parents[2] / "README.md"
@@ -36,7 +36,7 @@ def table() -> str:
         found = {r.policy: r for r in standings.of_scenario(scenario)}  # the best first
         if not found:
             continue
-        teams = [name for name, r in found.items() if not standings.is_reference(r)]
+        teams = [name for name, r in found.items() if name in policy_names() and not standings.is_reference(r)]
         script, nothing, correction = (
             _cell(found, next((name for name in teams if corrects.get(name) is kind), ""))
             for kind in (None, False, True)

@@ -58,7 +58,7 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
         shorter: Replacements by regular expression, in commands and Python.
         given: What the page leaves to its reader: names of Python, or files, and their text.
     """
-    parts = ["from tests.support.pages import provide, sh, write"]
+    parts = ["from tests.support.pages import MODULES, provide, sh, write"]
     for name, text in given.items():
         parts.append(f"write({name!r}, {text!r})" if "." in name else text)
     for kind, title, text in blocks(page):
@@ -70,7 +70,8 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
             text = re.sub(pattern, replacement, text, flags=re.MULTILINE)
         parts += [f"provide({name!r})" for name in re.findall(r"[\w./-]+\.safetensors", text)]
         if title is not None:
-            parts.append(f"write({title!r}, {text!r})\nimport {Path(title).stem}")
+            name = Path(title).stem
+            parts.append(f"write({title!r}, {text!r})\nimport {name}\nMODULES.append({name!r})")
         else:
             parts.append(text if kind == "python" else f"sh(*{shlex.split(text)!r})")
     return "\n".join(parts) + "\n"
@@ -93,36 +94,46 @@ def provide(name: str) -> None:
         PROVIDED.append(Path(name))
 
 
+MODULES: list[str] = []
+"""Names of the modules that a page has its reader write, which are imported."""
+
+
 def sh(program: str, *words: str) -> None:
-    """Run a command of a page; make only says what it would do, since it installs everything."""
-    if program == "posse":
+    """Run a command of a page; make only says what it would do, since it installs everything.
+
+    It runs in this process, which has imported what it needs, unless a command would find the reader's modules there.
+    """
+    while words[:1] == ("train",) and PROVIDED:  # which does not write where files of no run are
+        PROVIDED.pop().unlink()
+    if program == "posse" and not MODULES:
         run_posse(*words)
         return
     commands = {
         "make": ["make", "--dry-run", "--directory", str(ROOT), *words],
+        "posse": [sys.executable, "-c", f"import sys; from {__name__} import *; run_posse(*sys.argv[1:])", *words],
         "python": [sys.executable, *(str(ROOT / word) if word.endswith(".py") else word for word in words)],
     }
     subprocess.run(commands[program], check=True)
 
 
 def run_posse(*words: str) -> None:
-    """Run a command in this process, which has imported what it needs."""
+    """Run a command, and close every window after half a second, as a reader would some time."""
     close_windows()
-    while words[0] == "train" and PROVIDED:  # which does not write where files of no run are
-        PROVIDED.pop().unlink()
-    if ended := main(list(words)):
-        raise SystemExit(ended)
+    try:
+        assert not main(list(words)), words
+    except SystemExit as end:
+        assert not end.code, words  # noqa: PT017
 
 
 @functools.cache
 def close_windows() -> None:
-    """From now on close every window after half a second, as a reader would some time."""
-    threading.Thread(target=_close_windows, daemon=True).start()
+    """From now on close every window after half a second."""
 
+    def close() -> None:
+        while True:
+            time.sleep(0.5)
+            pygame: Any = sys.modules.get("pygame")
+            with contextlib.suppress(AttributeError, RuntimeError):  # missing, half imported, or without a window
+                pygame.event.post(pygame.event.Event(pygame.QUIT))
 
-def _close_windows() -> None:
-    while True:
-        time.sleep(0.5)
-        pygame: Any = sys.modules.get("pygame")
-        with contextlib.suppress(AttributeError, RuntimeError):  # missing, half imported, or without a window
-            pygame.event.post(pygame.event.Event(pygame.QUIT))
+    threading.Thread(target=close, daemon=True).start()

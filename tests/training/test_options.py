@@ -2,11 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-import tyro
-
 from posse_training.cli import main
-from posse_training.compare.compare import Settings
 from posse_training.options import settings_of, words_of
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import read_settings
@@ -18,18 +14,6 @@ def test_settings_are_read_and_written_alike() -> None:
     assert settings_of(words) == {**values, "extra_fields": ("own",)}
     assert words_of(settings_of(words)) == words
     assert settings_of(["num_neighbours=none", "arena=inf"]) == {"num_neighbours": None, "arena": float("inf")}
-
-
-@pytest.mark.parametrize(("words", "ray"), [("", False), ("--ray", True), ("--ray 10.0.0.1:6379", "10.0.0.1:6379")])
-def test_the_address_of_a_cluster_is_read(words: str, ray: bool | str) -> None:
-    assert tyro.cli(Settings, args=["idle", *words.split()]).ray == ray
-
-
-def test_a_world_of_another_size_is_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    changes = ["--scenario", "obstacles", "--set", "arena=14,10", "num_obstacles=1", "horizon=20", "settle_time=1.0"]
-    played = ["--episodes", "2", "--planner-episodes", "0", "--no-figures", "--out", str(tmp_path / "out")]
-    assert main(["compare", "idle", *changes, *played]) == 0
-    assert "arena=14,10" in capsys.readouterr().out.replace("\n", " ")
 
 
 def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:

@@ -49,15 +49,14 @@ def installed() -> str:
 
 @functools.cache
 def sources(package: str) -> str:
-    """Return a digest of the files of a package, or of a module's file; empty: it has none."""
+    """Return a digest of the files of a package, or of a module's and those beside it; empty: it has none."""
     spec = None if package == "__main__" else importlib.util.find_spec(package)
-    if spec is None or spec.origin is None or not Path(spec.origin).is_file():
+    if spec is None or not (spec.has_location or spec.submodule_search_locations):
         return ""
-    path = Path(spec.origin)
-    root = path.parent
-    files = [file for file in root.rglob("*") if file.suffix in _SUFFIXES] if path.name == "__init__.py" else [path]
+    inside = spec.submodule_search_locations
+    roots = map(Path, inside) if inside else [Path(spec.origin or "").parent]
+    files = [file for root in roots for file in root.glob("**/*" if inside else "*") if file.suffix in _SUFFIXES]
     digest = hashlib.sha256(package.encode())
     for file in sorted(files):
-        name = file.relative_to(root).as_posix()
-        digest.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+        digest.update(f"{file.name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()

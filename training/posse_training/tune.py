@@ -155,6 +155,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     run, folder = _Run(settings, console or Console()), settings.folder
     held = {name: value for name, value in asdict(settings).items() if name not in _FREE}
     held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
+    held["tunables"] = [list(each) for each in run.tunables]
     with connected(settings.ray), locked(folder):
         hold_settings(folder / "settings.json", held, results=(RESULT,))
         write_json(folder / RESULT, run.play())

@@ -159,6 +159,6 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     elif scenario in tuple(SCENARIOS):  # also of what is not hashable
         found = Scenario(name=scenario, **SCENARIOS[scenario])
     else:
-        families = "; families, as those of posse.family_names(), are for posse.batches"
+        families = "; families, as those of posse.family_names(), are for posse.batches, compare, tune and train"
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS) + families)
     return found.replace(**overrides) if overrides else found

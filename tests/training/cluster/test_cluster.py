@@ -22,16 +22,19 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
         return Job(partial(dict, policy), cut(9, 3)).folder
 
     slow, fast = (from_function(lambda o: 1.0 * o[..., :2]), from_function(lambda o: 2.0 * o[..., :2]))
-    mine = tmp_path / "team_of_mine.py"
-    mine.write_text("class Team: ...\n")
+    for module in ("team_of_mine", "helper", "space/mine"):
+        (tmp_path / f"{module}.py").parent.mkdir(exist_ok=True)
+        (tmp_path / f"{module}.py").write_text("class Team: ...\n")
     monkeypatch.syspath_prepend(tmp_path)
     names: list[Any] = [slow, fast, "idle", load("idle"), load("learned-smart"), "team_of_mine:Team"]
+    names.append("space.mine:Team")
     folders = [folder(each) for each in names]
     assert len(set(folders)) == len(names)
     assert [folder(each) for each in names] == folders
     provenance.sources.cache_clear()  # as in another process
-    mine.write_text("class Team: # other\n    ...\n")
-    assert [folder(each) == at for each, at in zip(names, folders, strict=True)] == [True] * 5 + [False]
+    for changed in ("helper", "space/mine"):
+        (tmp_path / f"{changed}.py").write_text("class Team: # other\n    ...\n")
+    assert [folder(each) == at for each, at in zip(names, folders, strict=True)] == [True] * 5 + [False] * 2
 
 
 def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> None:

@@ -76,6 +76,7 @@ def test_worlds_of_a_drawn_scenario_are_resampled_as_one() -> None:
     for found in (mean(values, 10), over_seeds(values, block=10), difference(values + other, other, 10)):
         assert (found.low, found.high) == pytest.approx(wanted, abs=0.15)
     assert difference([values, values], values + 1, 10).high == pytest.approx(-1)
+    assert over_seeds(other, block=10).low == pytest.approx(mean(other, 10).low), "a short block weighs less"
     few = mean(values[:30], 10)  # three blocks
     assert (few.low, few.high) == pytest.approx(stats.t.interval(0.95, 2, means[:3].mean(), stats.sem(means[:3])), 0.1)
 

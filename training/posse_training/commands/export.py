@@ -70,6 +70,7 @@ def export(policy: LearnedPolicy, out: str | Path) -> None:
     model = helper.make_model(graph, opset_imports=opset, ir_version=_IR_VERSION, producer_name="posse")
     helper.set_model_props(model, {"columns": json.dumps(named), "policy": json.dumps(policy.description())})
     checker.check_model(model)
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, model.SerializeToString())
 
 

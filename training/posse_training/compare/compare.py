@@ -89,7 +89,7 @@ class Settings:
     """Target that all teams play against: a motion, a learned target, a file or
     package.module:Class; default: the scenario's own."""
     overrides: Changes = field(default_factory=dict)
-    """Settings to change in each scenario, such as num_trackers=3 or arena=6,4."""
+    """Settings to change in each scenario, such as num_trackers=3 or arena=6,4, which is a range of a family."""
 
 
 def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
@@ -128,7 +128,7 @@ def _checked(settings: Settings) -> list[Scenario | Family]:
     check_settings(settings)
     if not settings.scenario:
         raise SettingsError("no scenario is given: name one or several, or all")
-    names = scenario_names() if "all" in settings.scenario else settings.scenario
+    names = [each for name in settings.scenario for each in (scenario_names() if name == "all" else (name,))]
     found = [scenario_or_family(name, **settings.overrides) for name in dict.fromkeys(names)]
     for scenario in found:
         first, _ = next(blocks(scenario, range(1), 0, "train"))

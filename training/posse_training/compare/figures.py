@@ -134,7 +134,7 @@ def recovery(losses: Sequence[Plays], looks: Looks) -> Figure:
     times = np.arange(0, latest + 1e-9, scenario.control_step)
     for plays in losses:
         # nan, which means never, compares false
-        shares = [share((plays["recovery_time"] <= time + 1e-9).reshape(-1)) for time in times]
+        shares = [share(plays["recovery_time"] <= time + 1e-9) for time in times]
         low, high = [s.low for s in shares], [s.high for s in shares]
         axis.fill_between(times, low, high, step="post", color=looks[plays.label].colour, alpha=0.15, linewidth=0)
         _steps(axis, times, np.array([s.value for s in shares]), looks, plays.label)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from rich import box
 from rich.table import Table
 from rich.text import Text
@@ -46,18 +45,13 @@ def row_of(plays: Plays, reference: Plays | None) -> Row:
         "safe_score": over_seeds(plays["safe_score"], block=block),
         "of_planner": None,  # filled in once the planner has played
         "score": over_seeds(plays["score"], block=block),
-        "contact_free": _share(plays["contact_free"] == 1, block),
+        "contact_free": share(plays["contact_free"] == 1, block),
         "interquartile_mean": over_seeds(plays["safe_score"], middle_mean, block),
         "bound": over_seeds(plays["bound"], block=block),
-        "settled": _share(np.isfinite(plays["settling_time"]), block),
+        "settled": share(np.isfinite(plays["settling_time"]), block),
         "difference": None if gaps is None else difference(*gaps, block),
         "improvement": None if gaps is None else improvement(*gaps, block),
     }
-
-
-def _share(happened: npt.NDArray[np.bool_], block: int) -> Estimate:
-    """Return the share of episodes in which something happened, (S, W)."""
-    return share(happened) if len(happened) == block == 1 else over_seeds(happened, block=block)
 
 
 def ranked(rows: Sequence[Row]) -> list[Row]:

@@ -18,7 +18,6 @@ import numpy.typing as npt
 import scipy  # its parts are imported when they are used: scipy.stats takes a second
 
 RESAMPLES: Final = 2000
-_AT_ONCE: Final = 100
 LEVEL: Final = 0.95
 
 Values = npt.NDArray[np.float64]
@@ -48,7 +47,8 @@ def mean(values: npt.ArrayLike, block: int = 1) -> Estimate:
     if not known.any():
         return Estimate(np.nan, np.nan, np.nan, 0)
     kept = np.where(known, blocks, np.nan)[known.any(axis=1)].reshape(1, -1)
-    return replace(_resample((kept,), np.nanmean, block), count=int(known.sum()))
+    statistic = np.nanmean if np.isnan(kept).any() else np.mean  # the one takes several times as long as the other
+    return replace(_resample((kept,), statistic, block), count=int(known.sum()))
 
 
 def middle_mean(samples: Values, axis: int) -> Any:
@@ -56,11 +56,12 @@ def middle_mean(samples: Values, axis: int) -> Any:
     return scipy.stats.trim_mean(samples, 0.25, axis)
 
 
-def share(happened: npt.ArrayLike) -> Estimate:
-    """Return the share of episodes in which something happened, with Wilson's interval."""
-    events = np.asarray(happened, bool).reshape(-1)
-    if len(events) == 0:
-        return Estimate(np.nan, np.nan, np.nan, 0)
+def share(happened: npt.ArrayLike, block: int = 1) -> Estimate:
+    """Return the share of episodes (S, W) in which something happened: Wilson's interval for one seed and scenario."""
+    events = np.asarray(happened, bool)
+    if len(events) > 1 or block > 1:
+        return over_seeds(events, block=block)
+    events = events.reshape(-1)
     interval = scipy.stats.binomtest(int(events.sum()), len(events)).proportion_ci(
         confidence_level=LEVEL, method="wilson"
     )
@@ -128,7 +129,6 @@ def _seeds_by_worlds(values: npt.ArrayLike) -> Values:
 def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Estimate:
     """Return a statistic, of an axis, of parts (S, W): each has its own seeds, all have the same worlds."""
     worlds = parts[0].shape[1]
-    block = min(block, worlds)
     blocks = -(-worlds // block)
     spread = []
     for part in parts:
@@ -136,13 +136,14 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
         wider = np.sqrt(seeds / (seeds - 1)) if seeds > 1 else 1.0
         spread.append(part + (wider - 1) * (means - means.mean()))
     rng = np.random.default_rng(0)
-    drawn = np.empty((RESAMPLES // _AT_ONCE, _AT_ONCE))
+    n = 100 if worlds % block == 0 and sum(part.size for part in parts) < 50_000 else 1  # at once
+    drawn = np.empty((RESAMPLES // n, n))
     for row in drawn:
-        first = block * rng.integers(blocks, size=(_AT_ONCE, blocks, 1))
-        chosen = first + np.arange(block) % (worlds - first)  # the worlds of a short last block are repeated
-        whose = [rng.integers(len(part), size=(_AT_ONCE, len(part), 1)) for part in spread]
-        samples = (part[s, chosen.reshape(_AT_ONCE, 1, -1)] for part, s in zip(spread, whose, strict=True))
-        row[:] = statistic(*(sample.reshape(_AT_ONCE, -1) for sample in samples), axis=-1)
+        chosen = block * rng.integers(blocks, size=(n, blocks, 1)) + np.arange(block)
+        chosen = chosen[chosen < worlds].reshape(n, 1, -1)  # the last block may be short
+        whose = [rng.integers(len(part), size=(n, len(part), 1)) for part in spread]
+        samples = (part[s, chosen].reshape(n, -1) for part, s in zip(spread, whose, strict=True))
+        row[:] = statistic(*samples, axis=-1)
     found, tail = float(statistic(*(part.reshape(-1) for part in parts), axis=-1)), 50 * (1 - LEVEL)
     low, high = np.percentile(drawn, (tail, 100 - tail))
     if block > 1 and blocks > 1:  # few: their percentiles would lie too near
