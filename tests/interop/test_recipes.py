@@ -27,7 +27,8 @@ def test_a_recipe_runs(name: str, tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
 def test_a_recipe_runs_in_an_environment_of_its_own(name: str, tmp_path: Path) -> None:
-    elsewhere(RECIPES / f"{name}.py", environment=OWN_ENVIRONMENT[name], cwd=tmp_path, seconds=300)
+    alone = {"RAY_ADDRESS": "local"}  # of another test there may be a cluster
+    elsewhere(RECIPES / f"{name}.py", environment=OWN_ENVIRONMENT[name], cwd=tmp_path, seconds=300, **alone)
 
 
 @pytest.mark.long

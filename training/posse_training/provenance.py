@@ -55,7 +55,7 @@ def sources(package: str) -> str:
         return ""
     inside = spec.submodule_search_locations
     roots = map(Path, inside) if inside else [Path(spec.origin or "").parent]
-    files = [file for root in roots for file in root.glob("**/*" if inside else "*") if file.suffix in _SUFFIXES]
+    files = {file for root in roots for file in root.glob("**/*" if inside else "*") if file.suffix in _SUFFIXES}
     digest = hashlib.sha256(package.encode())
     for file in sorted(files):
         digest.update(f"{file.name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
