@@ -108,9 +108,10 @@ def sh(program: str, *words: str) -> None:
     if program == "posse" and not MODULES:
         run_posse(*words)
         return
+    code = f"import sys; from {__name__} import run_posse; run_posse(*sys.argv[1:])"
     commands = {
         "make": ["make", "--dry-run", "--directory", str(ROOT), *words],
-        "posse": [sys.executable, "-c", f"import sys; from {__name__} import *; run_posse(*sys.argv[1:])", *words],
+        "posse": [sys.executable, "-c", code, *words],
         "python": [sys.executable, *(str(ROOT / word) if word.endswith(".py") else word for word in words)],
     }
     subprocess.run(commands[program], check=True)
