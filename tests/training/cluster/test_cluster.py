@@ -22,12 +22,11 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
         return Job(partial(dict, policy), cut(9, 3)).folder
 
     slow, fast = (from_function(lambda o: 1.0 * o[..., :2]), from_function(lambda o: 2.0 * o[..., :2]))
-    for module in ("team_of_mine", "helper", "space/mine"):
+    for module in ("mine", "helper", "space/mine"):
         (tmp_path / f"{module}.py").parent.mkdir(exist_ok=True)
         (tmp_path / f"{module}.py").write_text("class Team: ...\n")
     monkeypatch.syspath_prepend(tmp_path)
-    names: list[Any] = [slow, fast, "idle", load("idle"), load("learned-smart"), "team_of_mine:Team"]
-    names.append("space.mine:Team")
+    names: list[Any] = [slow, fast, "idle", load("idle"), load("learned-smart"), "mine:Team", "space.mine:Team"]
     folders = [folder(each) for each in names]
     assert len(set(folders)) == len(names)
     assert [folder(each) for each in names] == folders
