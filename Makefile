@@ -9,8 +9,11 @@ PINS := pyproject.toml constraints.txt
 BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-# Half of the modules are never imported; Python compiles the others when they are.
 INSTALL := install --no-compile --constraint
+# pip compiles modules on one core; this does on all, and where PYTHONDONTWRITEBYTECODE is set nothing else does. Left
+# out is what the tests hardly import: others' tests, torch's compiler, and tools. One module of torch is for another
+# Python.
+COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone. AgileRL's pins
@@ -101,10 +104,12 @@ $(BIN)/python:
 
 $(BASE): $(PINS) | $(BIN)/python
 	$(PIP) $(INSTALL) constraints.txt --editable .
+	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $@
 
 $(FULL): $(PINS) | $(BIN)/python
 	$(PIP) $(INSTALL) constraints.txt --editable '.[training,dev,docs]'
+	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $(BASE) $@
 
 define BESIDE
@@ -122,6 +127,7 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps \
 		pufferlib gym gym-notices robotarium-python-simulator
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
+	@$(RECIPES)/bin/$(COMPILE) $(RECIPES)/lib || true
 	@touch $@
 
 $(AGILERL)/recipes.stamp: constraints-recipes.txt $(FULL)
