@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.support.pages import PAGES, ROOT, blocks, named, script_of
+from tests.support.pages import END, PAGES, ROOT, blocks, named, script_of
 from tests.support.process import printed
 
 from posse_training.cli import COMMANDS, main
@@ -66,7 +66,7 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
     no_ray = importlib.util.find_spec("ray") is None
     script = script_of(page, [*NOT_RUN, *["--ray"] * no_ray], SHORTER, GIVEN)
     (tmp_path / "page.py").write_text(script, encoding="utf-8")
-    printed("page.py", cwd=tmp_path, seconds=300, BROWSER="true")
+    assert printed("page.py", cwd=tmp_path, seconds=300, BROWSER="true").endswith(f"{END}\n")
 
 
 @functools.cache

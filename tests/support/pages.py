@@ -1,7 +1,6 @@
 """A page of the README or the manual as a script: its Python and the lines of its shell, in order."""
 
 import contextlib
-import functools
 import re
 import shlex
 import shutil
@@ -58,7 +57,7 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
         shorter: Replacements by regular expression, in commands and Python.
         given: What the page leaves to its reader: names of Python, or files, and their text.
     """
-    parts = ["from tests.support.pages import MODULES, provide, sh, write"]
+    parts = ["from tests.support.pages import END, MODULES, close_windows, provide, sh, write", "close_windows()"]
     for name, text in given.items():
         parts.append(f"write({name!r}, {text!r})" if "." in name else text)
     for kind, title, text in blocks(page):
@@ -74,7 +73,7 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
             parts.append(f"write({title!r}, {text!r})\nimport {name}\nMODULES.append({name!r})")
         else:
             parts.append(text if kind == "python" else f"sh(*{shlex.split(text)!r})")
-    return "\n".join(parts) + "\n"
+    return "\n".join([*parts, "print(END)"]) + "\n"
 
 
 def write(name: str, text: str) -> None:
@@ -94,6 +93,7 @@ def provide(name: str) -> None:
         PROVIDED.append(Path(name))
 
 
+END = "followed to the end"
 MODULES: list[str] = []
 """Names of the modules that a page has its reader write, which are imported."""
 
@@ -106,9 +106,9 @@ def sh(program: str, *words: str) -> None:
     while words[:1] == ("train",) and PROVIDED:  # which does not write where files of no run are
         PROVIDED.pop().unlink()
     if program == "posse" and not MODULES:
-        run_posse(*words)
+        assert not main(list(words)), words
         return
-    code = f"import sys; from {__name__} import run_posse; run_posse(*sys.argv[1:])"
+    code = f"import sys; from {__name__} import close_windows, main; close_windows(); sys.exit(main(sys.argv[1:]))"
     commands = {
         "make": ["make", "--dry-run", "--directory", str(ROOT), *words],
         "posse": [sys.executable, "-c", code, *words],
@@ -117,18 +117,8 @@ def sh(program: str, *words: str) -> None:
     subprocess.run(commands[program], check=True)
 
 
-def run_posse(*words: str) -> None:
-    """Run a command, and close every window after half a second, as a reader would some time."""
-    close_windows()
-    try:
-        assert not main(list(words)), words
-    except SystemExit as end:
-        assert not end.code, words  # noqa: PT017
-
-
-@functools.cache
 def close_windows() -> None:
-    """From now on close every window after half a second."""
+    """From now on close every window after half a second, as a reader would some time."""
 
     def close() -> None:
         while True:

@@ -115,10 +115,10 @@ def test_what_it_cannot_sense_changes_nothing() -> None:
 
 
 def test_poses_that_are_told_in_drifting_frames_are_aligned() -> None:
-    drifts: dict[str, Any] = {"odometry_drift": 0.1, "heading_drift": 0.03, "horizon": 200}
+    drifts: dict[str, Any] = {"odometry_drift": 0.1, "heading_drift": 0.03, "horizon": 300}
     policy = load("belief-planner")
     batch = posse.batch("robots", 3, split="train", message_size=policy.message_size, **drifts)
-    assert play(batch, policy)["safe_score"].mean() > 0.4
+    assert play(batch, policy)["safe_score"].mean() > 0.5
 
 
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
