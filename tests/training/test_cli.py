@@ -73,6 +73,8 @@ INVALID = {
     "train --scenario search --discount 0.1": "discount=0.1 is for ppo, mappo, sac and td3, not cmaes",
     "train --algorithm sac --steps 10_000": "learning_starts=20000 must be below steps=10000",
     "replay idle --set target_motion=agent": "the target of 'smart' is an agent",
+    "replay idle --set arna=6,4": "did you mean 'arena'",
+    "replay none.html": "cannot read a replay from none.html",
     "replay idle --set arena=6 arena=4": "'arena' is set twice",
     "train --steps 0 --reward-weights slot=1 --reward_weights contact=1": "--reward-weights is given twice",
     "export pursuit --out x.onnx": "pursuit",

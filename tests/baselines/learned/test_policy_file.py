@@ -110,6 +110,8 @@ LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, 
         ({"adviser": "ddcs-distributed"}, "the network takes"),
         ({"encoding": {**LONG, "kind": "fancy"}}, "encodings are: plain"),
         ({"encoding": LONG}, "takes"),
+        ({"card": "name"}, "is damaged"),
+        ({"card": {"side": "both"}}, "side='both'"),
         ({"card": {"trained_splits": ["trian"]}}, "trained_splits="),
     ],
 )
