@@ -139,6 +139,9 @@ class Beliefs(Minds):
         working[rows, own] = True
         worlds.write(self._past)
         worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
+        silent, last = ~working & (mates["step"] >= 0), unit_of(self.layout.scenario) * mates["position"]
+        robots = worlds.tracker  # one that was taken to drive on meanwhile would stand in the way of others
+        robots["x"][silent], robots["y"][silent], robots["speed"][silent] = last.real[silent], last.imag[silent], 0.0
         self._advance(self._seen, 0)
         self._past.write(worlds)
         for array in self._told:

@@ -148,3 +148,15 @@ def test_noisy_fixes_are_filtered() -> None:
     _, memory = policy.act(batch.reset(), begin(policy, batch))
     assert np.isfinite(memory.now.observe()).all(), "as worlds of a user's own motion must be"
     believed(batch.scenario.replace(arena=990.0, start_distance=(1.0, 1000.0)))  # the widest that is allowed
+
+
+def test_a_robot_that_fell_silent_is_believed_where_it_was_heard_last() -> None:
+    policy = BeliefPlanner(QUICK_BELIEF)
+    batch = posse.batch("field", 4, seed=3, start_distance=(2.0, 4.0), message_size=policy.message_size)
+    observations, memory = batch.reset(), begin(policy, batch)
+    batch.arrays.tracker["breaks_at"][:, 0] = 20
+    for _ in range(100):
+        actions, memory = policy.act(observations, memory)
+        observations = batch.step(actions)[0]
+    robots, truly = memory.now.arrays.tracker.reshape(4, 5, 5)[:, 1:, 0], batch.arrays.tracker[:, :1]
+    assert np.hypot(robots["x"] - truly["x"], robots["y"] - truly["y"]).max() < 0.2
