@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from tests.support.process import python
 
+pytestmark = pytest.mark.long
 EXTRAS = {
     "training": ["torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "wandb"],
     "datasets": ["minari"],

@@ -11,7 +11,6 @@ from posse_baselines.policies.belief_planner import BeliefPlanner, believed
 from posse_baselines.policies.planner import Planner, PlannerSettings
 
 QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
-"""Looks ahead for a shorter time than it should."""
 QUICK_BELIEF = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=0)
 
 

@@ -135,6 +135,7 @@ def play(*folders: tuple[Path, Path]) -> tuple[list[list[str]], str]:
     return [line.split() for line in done.stdout.splitlines()], done.stderr
 
 
+@pytest.mark.long
 def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(tmp_path: Path) -> None:
     first, cache = write(tmp_path / "first"), tmp_path / "cache"
     [printed], said = play((first, cache))
@@ -147,8 +148,8 @@ def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(t
     assert hits == {what: ["True", "1" if "not reach" in what else "0"] for what in EDITS}
 
 
+@pytest.mark.long
 def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
-    """Also one that holds another kernel."""
     other = write(tmp_path / "other", "gains", "A = 1.0", "A = 3.0"), tmp_path / "other-cache"
     mine = write(tmp_path / "mine"), tmp_path / "cache"
     play(other, mine)

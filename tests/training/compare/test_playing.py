@@ -28,6 +28,7 @@ def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
     )
 
 
+@pytest.mark.long
 def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     names = ("Raises", "Nan", "Crashes")
     settings = settings_for(tmp_path, *names)
