@@ -72,8 +72,8 @@ def test_the_command_says_how_to_load(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["record", "idle", "--scenario", "constant", "--episodes", "1"]) == 0
+    assert main(["record", "idle", "--scenario", "constant", "--episodes", "1", "--out", "data sets"]) == 0
     told = capsys.readouterr().out
-    assert "MINARI_DATASETS_PATH=runs/datasets and minari.load_dataset('posse/constant/idle-v0')" in told
-    monkeypatch.setenv("MINARI_DATASETS_PATH", "runs/datasets")
+    assert "MINARI_DATASETS_PATH='data sets' and minari.load_dataset('posse/constant/idle-v0')" in told
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "data sets")
     assert minari.load_dataset("posse/constant/idle-v0")[0].observations.shape[0] == 601

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -172,5 +173,5 @@ def main(arguments: Sequence[str]) -> None:
     dataset = record_dataset(**values)
     print(
         f"{dataset.total_episodes} episodes, {dataset.total_steps:,} steps: "
-        f"MINARI_DATASETS_PATH={which.out} and minari.load_dataset({dataset.spec.dataset_id!r})"
+        f"MINARI_DATASETS_PATH={shlex.quote(str(which.out))} and minari.load_dataset({dataset.spec.dataset_id!r})"
     )
