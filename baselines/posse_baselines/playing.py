@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse import Batch, ObservationLayout, PairedBatch, Scenario
+from posse import Batch, ObservationLayout, PairedBatch, Scenario, get_scenario
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
 from posse_baselines.registry import Target
@@ -194,9 +194,9 @@ def poses_of(state: Mapping[str, Array], who: str) -> Array:
 
 
 def batch_for(
-    policy: Policy, scenario: Scenario, num_worlds: int = 1, target: Target | None = None, **settings: Any
+    policy: Policy, scenario: str | Scenario, num_worlds: int = 1, target: Target | None = None, **settings: Any
 ) -> Batch:
-    """Return worlds for a policy that moves the trackers, against a target or the scenario's own motion.
+    """Return worlds of a scenario for a policy that moves the trackers, against a target or the scenario's motion.
 
     Their ``message_size`` is raised to that of the policy; ``settings`` are further arguments of :func:`posse.batch`.
     PolicyError if nothing moves the target, or the policy plans ahead in copies of the worlds, which lack its policy.
@@ -207,6 +207,7 @@ def batch_for(
             f"{policy.name!r} reads the state and plays the target's motion ahead: it cannot play against a target "
             "that is moved by a policy"
         )
+    scenario = get_scenario(scenario)
     size = max(scenario.message_size, policy.message_size)
     motion = scenario.target_motion if target is None else target.motion
     scenario = scenario.replace(message_size=size, target_motion=motion)

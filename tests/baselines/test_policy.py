@@ -8,7 +8,7 @@ from tests.support.adapters import out_of_band
 from tests.support.learned import policy_for
 
 import posse
-from posse_baselines import BasePolicy, Policy, PolicyError, begin, load, policy_names, rollout
+from posse_baselines import BasePolicy, Policy, PolicyError, batch_for, begin, load, policy_names, rollout
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.belief_planner import BeliefPlanner
@@ -16,11 +16,6 @@ from posse_baselines.policies.planner import PlannerSettings
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if name != "planner"]
-
-
-def batch_for(policy: Policy, scenario: str, worlds: int, **settings: Any) -> posse.Batch:
-    settings = {"message_size": policy.message_size, "horizon": 60, **settings}
-    return posse.batch(scenario, worlds, **settings)
 
 
 def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[Any, Any]:
@@ -33,7 +28,7 @@ def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[Any, Any]:
 def test_an_episode_unpickled_from_buffers_goes_on_as_before(name: str) -> None:
     policy = load(name)
     assert (policy.name, policy.reads_state) == (name, name not in PLAYS_BY_THE_RULES)
-    batch = batch_for(policy, "field", 2)
+    batch = batch_for(policy, "field", 2, horizon=60)
     observations, memory = batch.reset(seed=1), begin(policy, batch)
     for _ in range(5):
         actions, memory = policy.act(observations, memory)
@@ -66,7 +61,7 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
     policy = load(name)
     if name == "belief-planner" and settings.get("num_trackers") == 64:  # each plans for all
         policy = BeliefPlanner(PlannerSettings(look_ahead=0.5, rounds=0))
-    batch = batch_for(policy, "constant", 2, **settings)
+    batch = batch_for(policy, "constant", 2, **{"horizon": 60, **settings})
     reads = [field.name for field in policy.encoding.fields] if isinstance(policy, LearnedPolicy) else []
     if "sonar" in reads and "sonar_beams" in settings:
         with pytest.raises(PolicyError, match="sonar"):  # its network reads it
@@ -79,8 +74,8 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
 def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
     policy = load(name)
     worlds = 30 if name == "belief-planner" else 416  # so many that threads share them; each of its trackers keeps one
-    many = batch_for(policy, "field", worlds, seed=4)
-    alone = batch_for(policy, "field", 1, seed=4, first_world=worlds - 1)
+    many = batch_for(policy, "field", worlds, seed=4, horizon=60)
+    alone = batch_for(policy, "field", 1, seed=4, first_world=worlds - 1, horizon=60)
     steps = 12 if policy.reads_state else 8  # the planner's: it plans three times
     np.testing.assert_array_equal(trace(policy, many, steps)[1][:, -1], trace(policy, alone, steps)[1][:, 0])
 
@@ -89,7 +84,7 @@ def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
 def test_trackers_know_only_their_own_observation(name: str) -> None:
     # Tracker 0 acts independently of the observations of others.
     policy = load(name)
-    seen, done = trace(policy, batch := batch_for(policy, "constant", 2), 20)
+    seen, done = trace(policy, batch := batch_for(policy, "constant", 2, horizon=60), 20)
     policy = load(name)  # nothing is remembered outside of the memory
     memory = policy.begin(batch.layout, 2)
     for observations, actions in zip(seen, done, strict=True):
@@ -102,7 +97,7 @@ def test_trackers_know_only_their_own_observation(name: str) -> None:
 @pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
 def test_a_restarted_world_plays_as_a_new_one(name: str) -> None:
     policy = load(name)
-    seen, done = trace(policy, batch := batch_for(policy, "field", 2), 25)
+    seen, done = trace(policy, batch := batch_for(policy, "field", 2, horizon=60), 25)
     memory = policy.begin(batch.layout, 2)
     for observations in seen:
         actions, memory = policy.act(observations, memory)
@@ -196,7 +191,7 @@ def test_the_script_refuses_a_sensor_of_bearings_alone() -> None:
 @pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])
 def test_observations_of_another_shape_are_refused(name: str) -> None:
     policy = load(name)
-    batch = batch_for(policy, "constant", 3)
+    batch = batch_for(policy, "constant", 3, horizon=60)
     memory = begin(policy, batch)
     with pytest.raises(PolicyError, match=r"shape \(2, 5, .*wanted \(3, 5, "):
         policy.act(batch.reset()[:2], memory)

@@ -106,9 +106,7 @@ def test_an_unknown_target_is_refused(text: str, message: str) -> None:
 
 def results(target: str) -> dict[str, float]:
     team = load("ddcs-tuned")
-    moved = load_target(target)
-    scenario = posse.get_scenario("duel", target_motion=moved.motion)
-    batch = posse.batch(scenario, 40, seed=3, split="test", message_size=team.message_size, target_policy=moved.policy)
+    batch = batch_for(team, "duel", 40, load_target(target), seed=3, split="test")
     return {name: float(values.mean()) for name, values in play(batch, team).items()}
 
 

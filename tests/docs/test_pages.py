@@ -14,7 +14,7 @@ import pytest
 from tests.support.process import ROOT, printed
 
 import posse
-from posse_baselines import load, play, policy_names
+from posse_baselines import batch_for, load, play, policy_names
 from posse_training.leaderboard import Standing, standings_text
 
 DOCS = ROOT / "docs"
@@ -32,8 +32,7 @@ def test_every_policy_and_scenario_is_in_the_manual() -> None:
 def test_the_loop_plays_an_episode(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(DOCS / "tutorials" / "step_loop.py"))
     policy = load("ddcs-distributed")
-    batch = posse.batch("smart", 1, seed=1, message_size=policy.message_size)
-    assert float(capsys.readouterr().out) == play(batch, policy)["safe_score"][0]
+    assert float(capsys.readouterr().out) == play(batch_for(policy, "smart", seed=1), policy)["safe_score"][0]
 
 
 @pytest.mark.long

@@ -27,12 +27,11 @@ def worlds(count: int = 6) -> posse.Batch:
 @pytest.mark.parametrize(("kind", "safeguard"), [("plain", False), ("features", True)])
 def test_an_answer_of_zero_is_the_adviser_itself(kind: str, safeguard: bool) -> None:
     mine = play(worlds(), listener((0.0, 0.0), kind, safeguard), seed=3)
-    ddcs = play(worlds(), SCRIPT, seed=3)
-    for name, values in ddcs.items():
+    for name, values in play(worlds(), SCRIPT, seed=3).items():
         np.testing.assert_array_equal(mine[name], values, err_msg=name)
 
 
-def test_an_answer_is_twice_as_large_a_correction() -> None:
+def test_an_answer_is_twice_as_large_a_correction_and_leaves_the_message() -> None:
     batch, ddcs, answer = worlds(), SCRIPT, np.array((0.125, -0.25), np.float32)
     observations = batch.reset(seed=3)
     proposals, memory = ddcs.propose(observations, ddcs.begin(batch.layout, 6))
@@ -40,3 +39,6 @@ def test_an_answer_is_twice_as_large_a_correction() -> None:
     policy = listener((0.125, -0.25))
     corrected, _ = policy.act(observations, policy.begin(batch.layout, 6))
     np.testing.assert_array_equal(corrected, wanted)
+    plain, _ = ddcs.act(observations, ddcs.begin(batch.layout, 6))
+    assert (corrected[..., :2] != plain[..., :2]).any()
+    np.testing.assert_array_equal(corrected[..., 2:], plain[..., 2:])

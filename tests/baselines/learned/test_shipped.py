@@ -9,7 +9,7 @@ import pytest
 from scripts.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_target_check, replay
 
 import posse
-from posse_baselines import load_target
+from posse_baselines import batch_for, load_target
 from posse_baselines.learned import Encoder, LearnedPolicy
 from posse_baselines.registry import SHIPPED, SHIPPED_TARGETS
 from posse_training import evaluate
@@ -46,8 +46,7 @@ def test_a_shipped_team_says_how_it_was_made(path: Path) -> None:
     scenarios = check_scenarios(card["check"])
     assert [play["version"] for play in card["check"]["plays"]] == [scenario.version for scenario in scenarios]
     for scenario in scenarios:
-        needs = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
-        Encoder(policy.encoding, posse.ObservationLayout(needs), 1)
+        Encoder(policy.encoding, batch_for(policy, scenario).layout, 1)
     with pytest.raises(ValueError, match="was trained on the split 'train'"):
         evaluate(policy, "constant", 1, split="train", progress=False)
 

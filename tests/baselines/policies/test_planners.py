@@ -116,8 +116,7 @@ def test_what_it_cannot_sense_changes_nothing() -> None:
 def test_poses_that_are_told_in_drifting_frames_are_aligned() -> None:
     drifts: dict[str, Any] = {"odometry_drift": 0.1, "heading_drift": 0.03, "horizon": 300}
     policy = load("belief-planner")
-    batch = posse.batch("robots", 3, split="train", message_size=policy.message_size, **drifts)
-    assert play(batch, policy)["safe_score"].mean() > 0.5
+    assert play(batch_for(policy, "robots", 3, split="train", **drifts), policy)["safe_score"].mean() > 0.5
 
 
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
@@ -151,7 +150,7 @@ def test_noisy_fixes_are_filtered() -> None:
 
 def test_a_robot_that_fell_silent_is_believed_where_it_was_heard_last() -> None:
     policy = BeliefPlanner(QUICK_BELIEF)
-    batch = posse.batch("field", 4, seed=3, start_distance=(2.0, 4.0), message_size=policy.message_size)
+    batch = batch_for(policy, "field", 4, seed=3, start_distance=(2.0, 4.0))
     observations, memory = batch.reset(), begin(policy, batch)
     batch.arrays.tracker["breaks_at"][:, 0] = 20
     for _ in range(100):

@@ -14,6 +14,7 @@ from tests.support.reference.state import directions, points
 import posse
 from posse import Scenario, ScenarioError
 from posse.scenarios.scenario import FORMATIONS
+from posse_baselines import load, rollout
 
 FIELDS = [field.name for field in dataclasses.fields(Scenario)]
 
@@ -163,6 +164,15 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
 
 
 # --- the named scenarios --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_its_bound_leaves_room_to_distinguish_teams(name: str) -> None:
+    played = rollout(posse.batch(name, 6, seed=5), load("random"))
+    assert (played.lengths == posse.get_scenario(name).horizon).all()
+    score, bound = played.metrics["score"], played.metrics["bound"]
+    assert ((score >= 0) & (score <= bound + 1e-6)).all()
+    assert 0.6 < bound.mean() < 0.99
 
 
 @pytest.mark.parametrize("formation", FORMATIONS)

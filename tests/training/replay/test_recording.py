@@ -8,7 +8,7 @@ import pytest
 from tests.support.replays import short
 
 import posse
-from posse_baselines import Recorder, begin, load
+from posse_baselines import Recorder, batch_for, begin, load
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.replay import RECORD, Player, Replay, record, replay_of
 from posse_training.replay.columns import find_events
@@ -44,8 +44,7 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
     settings = posse.get_scenario(scenario, horizon=150)
     recorded = record([policy], settings, seed=5, world=2)
     player = decode(encode(recorded)).players[0]
-    settings = settings.replace(message_size=max(settings.message_size, player_of.message_size))
-    batch = posse.Batch(settings, 1, seed=5, split="test", first_world=2, autoreset="disabled")
+    batch = batch_for(player_of, settings, seed=5, split="test", first_world=2, autoreset="disabled")
     memory, observations = begin(player_of, batch), batch.reset()
     column, outage = player.columns, round(settings.outage_time / settings.control_step)
     assert player.frames == 151
