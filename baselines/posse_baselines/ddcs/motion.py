@@ -222,7 +222,7 @@ def explore(team: Team, me: Record, mates: Records) -> complex:
     """
     world, settings = team.world, team.settings
     off = me.position - (me.target if world.walled == 0 and me.fix_step >= 0 else 0j)
-    way = me.heading + scaled(steering.push_inwards(off, world.inner), _BORDER)
+    way = me.heading + me.pull + scaled(steering.push_inwards(off, world.inner), _BORDER)
     for j in range(len(mates)):
         if mates[j].there:
             way += steering.push_from(mates[j].place - me.position, settings.apart)

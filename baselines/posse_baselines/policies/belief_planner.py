@@ -8,6 +8,7 @@ corrects the present by what the engine makes of it, and is not rolled forward o
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -36,6 +37,10 @@ _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to t
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
 _SLOPE_TRUST: Final = 2.0  # correction of a weave's cosine for each rad/s by which its turn rate was foreseen wrong
 _RATE_TRUST: Final = 0.1  # 1/s; correction of a weave's rate for each rad by which its phase was foreseen wrong
+_PARTICLES: Final = 300
+_BEND: Final = 0.5  # rad/s; standard deviation of their turn rates
+_FEW: Final = 0.05  # share of the particles that are left when all count again
+_PULL: Final = 0.5  # of the particles, where the own heading pulls by 1
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
 
 _SEEN: Final = record_type(
@@ -43,6 +48,8 @@ _SEEN: Final = record_type(
     ("theta", np.float64),  # heading then, rad
     ("variance", np.float64),  # of where the target is believed to be now, m²
 )
+
+_PARTICLE: Final = record_type(("place", np.complex128), ("course", np.complex128), ("unseen", np.bool_))
 
 
 class _Told(NamedTuple):
@@ -115,9 +122,15 @@ class Beliefs(Minds):
             np.zeros((window + 1, *self.now.action_shape), np.float32),
         )
         # With more rounds, plans of trackers that know different things differ more: 0.01 to 0.02 less on radio.
-        self.search = Search(plans or PlannerSettings(rounds=2 if self.late else 4), self.now)
+        self.search = Search(plans or PlannerSettings(rounds=2 if self.late else 6), self.now)
         arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
         self.search.teams.late[:] = _UNSEEN_DELAY * (np.array(arms) > scenario.sensing_range)
+        rng, count = np.random.default_rng(0), _PARTICLES if scenario.walled else 0
+        self._drawn = np.ones(count, _PARTICLE)
+        x, y = rng.uniform(-1.0, 1.0, (2, count)) * np.reshape(scenario.half_sides, (2, 1))
+        self._drawn["place"], self._drawn["course"] = x + 1j * y, np.exp(1j * rng.uniform(-np.pi, np.pi, count))
+        self._bend = np.exp(1j * self.dt * _BEND * rng.normal(size=count))
+        self._particles = np.tile(self._drawn, (self.rows, 1))
         self.restart(np.ones(num_worlds, np.bool_))
 
     def restart(self, mask: BoolArray) -> None:
@@ -129,6 +142,7 @@ class Beliefs(Minds):
         self._seen[mask] = (-NEVER, 0.0, 0.0)
         self.newest[mask], self.age[mask] = -1, NEVER
         self._told.heard[:, mask], self._told.fixed[:, mask], self._told.played[:, mask] = False, False, 0.0
+        self._particles[mask] = self._drawn
         self.search.restart(mask)
 
     def plan(self, observations: FloatArray) -> FloatArray:
@@ -155,6 +169,33 @@ class Beliefs(Minds):
         actions = self.search.actions()
         self._told.played[-1] = actions
         return actions[rows, own, :2]
+
+    def look_for(self) -> None:
+        """Set which way each tracker is drawn in its search: to the particles that it is nearest to.
+
+        Particles are where the target may be: they drive on arcs between the walls, until the team sees their place.
+        """
+        s, me = self.layout.scenario, self.me.reshape(-1)
+        lost = np.flatnonzero(me["known"] == 0)
+        particles, rows, own = self._particles[lost], np.arange(len(lost)), me["number"][lost]
+        course = particles["course"] * self._bend
+        place = particles["place"] + s.target_speed * self.dt * course
+        at, ahead = (each.view(np.float64).reshape(*each.shape, 2) for each in (place, course))
+        np.copyto(ahead, -np.copysign(ahead, at), where=np.abs(at) > s.half_sides)
+        mates = self.mates.reshape(self.rows, -1)[lost]
+        there = mates["there"] != 0
+        there[rows, own] = True
+        ways = place[:, None] - unit_of(s) * mates["place"][..., None]
+        far = np.where(there[..., None], np.abs(ways), np.inf)
+        near = far.min(axis=1)
+        unseen = particles["unseen"] & (near > s.sensing_range)
+        unseen[unseen.mean(axis=1) < _FEW] = True
+        weight = np.where(unseen & (far[rows, own] == near), near, np.inf) ** -3.0
+        way = (weight / near * ways[rows, own]).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
+        me["pull"][lost] = _PULL * way
+        particles["place"], particles["course"], particles["unseen"] = place, course, unseen
+        self._particles["unseen"] = True
+        self._particles[lost] = particles
 
     def planned(self) -> BoolArray:
         """Return whether each tracker plays what it planned, (E, N)."""
@@ -281,7 +322,7 @@ class BeliefPlanner(DDCS):
     """Model-predictive control in a world that each tracker keeps from what it observes and is told.
 
     Where the target is known, a tracker plays the planner's choice for it in its own world; else it searches as
-    ``ddcs-tuned`` does, whose monitoring, messages and safeguard it has in any case.
+    ``ddcs-tuned`` does, drawn to where the target may still be. Monitoring, messages and safeguard are of that, too.
     """
 
     def __init__(self, settings: PlannerSettings | None = None) -> None:
@@ -289,8 +330,8 @@ class BeliefPlanner(DDCS):
         self.plans = settings
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return the settings of ``ddcs-tuned`` for a scenario."""
-        return tuned_settings("ddcs-tuned", scenario)
+        """Return the settings of ``ddcs-tuned`` for a scenario, with the usual distances in the search."""
+        return replace(tuned_settings("ddcs-tuned", scenario), apart=Settings.apart)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode; PolicyError as for :class:`DDCS`."""
@@ -312,6 +353,8 @@ class BeliefPlanner(DDCS):
             plans["slot"][claimed] = mates["slot"][claimed]
         actions = memory.plan(np.asarray(observations, np.float32)).reshape(*me.shape, 2)
         planned = memory.planned()
+        if memory.layout.scenario.walled:
+            memory.look_for()
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
         # Plans make up for the lag of commands, and so does what carries them out.
         followed = memory.team.world["followed"][0]

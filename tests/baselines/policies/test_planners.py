@@ -34,6 +34,13 @@ def test_playing_ahead_is_worth_more_than_the_script(
     assert planned["contact_free"].all()
 
 
+def test_a_lone_tracker_searches_where_it_has_not_been() -> None:
+    alone = posse.get_scenario("search", num_trackers=1, target_speed=0.1)
+    teams = load("ddcs-distributed"), BeliefPlanner(QUICK_BELIEF)
+    scripted, believing = ((play(batch_for(team, alone, 60), team)["score"] > 0).mean() for team in teams)
+    assert believing > scripted + 0.1
+
+
 def test_worlds_whose_episodes_begin_at_different_steps_are_played_as_alone() -> None:
     planner, batch = Planner(QUICK), posse.batch("smart", 2, seed=1)
     memory, observations = begin(planner, batch), batch.reset()
