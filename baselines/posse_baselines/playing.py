@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.error import ResetNeeded
 
 import posse
 from posse import Batch, ObservationLayout, PairedBatch, Scenario, get_scenario
@@ -98,7 +99,7 @@ class Recorder:
 
     Attributes:
         over: (E,) whether the first episode of each world has ended.
-        steps: Number of recorded steps.
+        steps: Number of recorded steps; -1 before the first reset.
 
     Raises:
         ValueError: An unknown name, or one of a frame with ``autoreset="same_step"``, which overwrites the last one.
@@ -119,6 +120,7 @@ class Recorder:
         groups = {"state": state, "terms": ("reward",), "annotations": ("annotation",)}
         self._names = dict.fromkeys(each for name in names for each in groups.get(name, (name,)))
         self._reads_state = not self._names.keys().isdisjoint((*_POSES, *state))
+        self.over, self.steps = np.zeros(batch.num_worlds, np.bool_), -1
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
@@ -135,6 +137,7 @@ class Recorder:
         self, actions: npt.ArrayLike, annotations: Annotations | None = None
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance the batch (see :meth:`posse.Batch.step`) and record the step, with the annotations of a policy."""
+        self._check_reset()
         done = self.batch.step(actions)
         observations, rewards, terminated, truncated, infos = done
         self.steps += 1
@@ -165,6 +168,10 @@ class Recorder:
         self._keep_frame(observations)
         return done
 
+    def _check_reset(self) -> None:
+        if self.steps < 0:
+            raise ResetNeeded("a recorder records from its own reset on: call reset() of it first")
+
     def _keep_frame(self, observations: FloatArray) -> None:
         state = self.batch.state if self._reads_state else {}  # it takes as long as a step of a hundred worlds
         self._keep({name: poses_of(state, who) for name, who in _POSES.items() if name in self._names})
@@ -178,7 +185,7 @@ class Recorder:
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded since the reset; ResetNeeded before the first one."""
-        self.batch.check_started("trajectory")
+        self._check_reset()
         now = {name: np.array(values, np.float64) for name, values in self.batch.metrics().items()}
         for name, values in self._metrics.items():
             now[name][self.over] = values[self.over]

@@ -1,7 +1,6 @@
 """The interface of a policy.
 
-A policy drives the whole team, batch first (E worlds, N trackers, F numbers an observation, m
-numbers a message)::
+A policy drives the whole team, batch first (E worlds, N trackers, F numbers an observation, m numbers a message)::
 
     memory = policy.begin(batch.layout, batch.num_worlds)
     actions, memory = policy.act(observations, memory)      # (E, N, F) -> (E, N, 2 + m)
@@ -40,8 +39,7 @@ class Policy(TargetPolicy, Protocol):
 
     Attributes:
         name: Its name in results.
-        message_size: Numbers that it adds to each broadcast; the scenario's ``message_size`` must
-            be at least that.
+        message_size: Numbers that it adds to each broadcast; the scenario's ``message_size`` must be at least that.
         reads_state: Whether it reads the state of the worlds, which no tracker observes. Such a
             policy is a reference; :func:`begin` shows it the batch by its method ``watch(batch)``.
     """
@@ -155,7 +153,8 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         """Return the function's actions, (E, N, 2 + m), and the memory; ValueError if they have another shape."""
         found = np.asarray(self._function(observations))
         team, length = observations.shape[:2], 2 + memory.scenario.message_size
-        shape = team if self._discrete else (*team, 2 if found.shape[-1:] == (2,) else length)
+        own = found.shape[-1] if found.shape[-1:] in ((2,), (2 + self.message_size,)) else length
+        shape = team if self._discrete else (*team, own)
         chosen = as_motions(f"what the function of policy {self.name!r} returned", found, shape, self._discrete)
         actions = np.zeros((*team, length), np.float32)
         actions[..., : chosen.shape[2]] = chosen

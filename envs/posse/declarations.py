@@ -442,9 +442,8 @@ class sensor(Declaration):  # noqa: N801
 
     Args:
         name: What ``sensor`` of a scenario calls it.
-        measure: A function of the scenario, the world, the tracker's number and the vector to the
-            target, which returns the measured vector. Default: the true one with the scenario's
-            ``range_noise`` and ``bearing_noise``.
+        measure: A function of the scenario, the world, the tracker's number and the vector to the target, which returns
+            the measured vector. Default: the true one with the scenario's ``range_noise`` and ``bearing_noise``.
         fix: The kind of a fix, ``"position"`` or ``"bearing"``.
     """
 

@@ -139,6 +139,7 @@ def test_invalid_measurements_are_refused() -> None:
         (((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0, -1.0)), "age=-1.0"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, age=math.nan)]), "age=nan"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, [1.0]), f"{beams} distances"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0)), "give a list of posse.Heard"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(1, 0.0, 0.0, 0.0, 0.0, 0.0)]), "no team-mate"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, (1.0,))]), "wanted 0 numbers"),
     ):

@@ -160,6 +160,7 @@ def test_another_process_and_a_command_import_a_users_module(tmp_path: Path) -> 
 from posse_training.cli import main
 from posse_training.parallel import apart
 main("scenarios obstacles --import walls".split())
+assert main("replay idle --scenario smart --set extra_fields=wall_distance, --import walls".split()) == 2
 scenario = posse.get_scenario("obstacles", extra_fields=["wall_distance"])
 read = "import pickle, sys; print(pickle.load(sys.stdin.buffer).extra_fields)"
 subprocess.run([sys.executable, "-c", read], input=pickle.dumps(scenario), check=True)

@@ -77,6 +77,8 @@ def test_a_function_plays_as_a_policy() -> None:
     spoken = acted(policy, message_size=2)[1]
     assert spoken.shape == (2, 5, 4)
     assert not spoken[..., 2:].any()
+    brief = from_function(lambda o: np.ones((*o.shape[:2], 3)), message_size=1)
+    assert acted(brief, message_size=2)[1][0, 0].tolist() == [1, 1, 1, 0]
     numbers = from_function(lambda o: np.full(o.shape[:2], 7), discrete_actions=True)
     np.testing.assert_array_equal(acted(numbers)[1][0, 0], MOTIONS[7])
 

@@ -1,7 +1,6 @@
 """The wheel and the sdist are complete, and work where nothing else of posse is.
 
-They take minutes and the package index, so that they run where POSSE_TEST_PACKAGE is set: in
-continuous integration.
+They take minutes and the package index, so that they run where POSSE_TEST_PACKAGE is set: in continuous integration.
 """
 
 import os

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from posse import get_scenario
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 from posse_baselines.policies.simple import Idle
@@ -29,6 +30,11 @@ class Nan(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         actions, memory = super().act(observations, memory)
         return actions * np.float32(np.nan), memory
+
+
+class Builds(Idle):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        raise get_scenario("nope")  # type: ignore[misc]
 
 
 class Hangs(Idle):

@@ -67,8 +67,7 @@ def test_a_killed_driver_resumes(nodes: Cluster, local: Results, folder: Path) -
     """The shard that waits is lost with its driver; those that were done are not played again."""
     code = (
         "from pathlib import Path\nfrom posse_training.evaluation import evaluate, evaluation\n"
-        "from tests.support.bad_policies import Watched\n"
-        f"evaluation.WORLDS = {EPISODES // SHARDS}\n"
+        f"from tests.support.bad_policies import Watched\nevaluation.WORLDS = {EPISODES // SHARDS}\n"
         f"policy = Watched(Path({str(folder)!r}), 'wait')\n"
         f"evaluate(policy, 'smart', {EPISODES}, **{ {**THERE, 'ray': nodes.address}!r})\n"
     )

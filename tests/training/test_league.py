@@ -1,6 +1,7 @@
 """Leagues: generations, cross-play, best responses, and going on after a kill."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, killed_at, quiet
 
+from posse_baselines.registry import shipped
 from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.league import LeagueSettings, draw_matrix, play_league, shares
@@ -59,14 +61,14 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path) -> None:
 
     again = play_league(tiny(tmp_path / "whole"), console=quiet())
     assert again.cells == found.cells
-    files = draw_matrix(again)
-    assert all(path.stat().st_size > 1000 for path in files)
+    assert all(path.stat().st_size > 1000 for path in draw_matrix(again))
     start = json.loads((tmp_path / "whole/generation-02/target/settings.json").read_text())
     assert start["start"].endswith("generation-01/target"), "each begins where its side stood"
 
 
 def test_other_settings_are_refused(tmp_path: Path) -> None:
-    settings = tiny(tmp_path, generations=1, responses="none")
+    team = Path(shutil.copy(shipped()["learned-smart"], tmp_path / "team.safetensors"))
+    settings = tiny(tmp_path, teams=("idle", str(team)), generations=1, responses="none")
     play_league(settings, console=quiet())
     with pytest.raises(RunFolderError, match=r"holds a run with longer=1, not 2, seed=1, not 2"):
         play_league(replace(settings, seed=2, longer=2), console=quiet())
@@ -77,7 +79,8 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
     held = json.loads((tmp_path / "league.json").read_text())
     (tmp_path / "league.json").write_text(json.dumps({**held, "scenario_version": 0}))
-    with pytest.raises(RunFolderError, match="holds a run with scenario_version=0, not"):
+    shutil.copy(shipped()["learned-radio"], team)
+    with pytest.raises(RunFolderError, match=r"with scenario_version=0, not \d, digest of .*team\.safetensors='"):
         play_league(settings, console=quiet())
 
 

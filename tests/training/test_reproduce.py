@@ -54,8 +54,7 @@ def test_starts_are_the_figures() -> None:
 @pytest.mark.long
 def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
     rows = reproduce(tmp_path, starts=8)
-    written = json.loads((tmp_path / "settling.json").read_text())
-    assert written["policies"] == rows
+    assert json.loads((tmp_path / "settling.json").read_text())["policies"] == rows
     names = [f"{model.name}-{kind}" for model in MODELS for kind in ("frames", "curves")]
     for name in (*names, "tracks", "leader-loss"):
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000

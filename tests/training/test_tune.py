@@ -53,7 +53,8 @@ def test_a_folder_of_another_run_or_damaged(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(RunFolderError, match="holds a run with seed=3, not 4"):
         tune(small(run, seed=4), console=quiet())
     monkeypatch.setattr("posse_training.tune.software", lambda *names: dict.fromkeys(names, "0"))
-    with pytest.raises(RunFolderError, match=r"cmaes='[0-9.]+', not '0'"):
+    monkeypatch.setattr("posse_training.tune.digests", lambda names: {f"digest of {POLICY}": "0" for _ in names})
+    with pytest.raises(RunFolderError, match=rf"cmaes='[0-9.]+', not '0', .*digest of {POLICY}='.*', not '0'"):
         tune(small(run), console=quiet())
     monkeypatch.undo()
     (run / "state.json").write_text((run / "state.json").read_text()[:100])

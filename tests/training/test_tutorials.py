@@ -49,8 +49,7 @@ def test_own_policy(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
 
 
 def test_add_scenario(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    left = run("add_scenario.py", monkeypatch, "--episodes", 2)
-    assert left["night"].name == "night"
+    assert run("add_scenario.py", monkeypatch, "--episodes", 2)["night"].name == "night"
     shown = capsys.readouterr().out
     assert "4 trackers, " in shown
     scores = dict(re.findall(rf"^(\S+) +score {NUMBER}", shown, re.MULTILINE))

@@ -45,8 +45,7 @@ COMMANDS: Final = {name: command for group in GROUPS.values() for name, command 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return the exit status.
 
-    0: success; 1: part of the work failed, as the output says; 2: an error that the user can
-    correct; 130: interrupted.
+    0: success; 1: part of the work failed, as the output says; 2: an error that the user can correct; 130: interrupted.
     """
     parser = argparse.ArgumentParser("posse", "posse COMMAND ... [--import MODULE]", add_help=False, allow_abbrev=False)
     parser.add_argument("--import", dest="modules", action="append", default=[])
@@ -86,10 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"\nposse {name}: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        from posse import ScenarioError
+        from posse import DeclarationError, ScenarioError
         from posse_baselines import PolicyError
 
-        if not isinstance(error, (UserError, ScenarioError, PolicyError, OSError)):
+        if not isinstance(error, (UserError, ScenarioError, DeclarationError, PolicyError, OSError)):
             raise
         print(f"posse {name}: {error}", file=sys.stderr)
         return 2

@@ -23,8 +23,7 @@ from posse_training.replay import record, write_replay
 
 SCENARIO: Final = "smart"
 TEAMS: Final = {"script": "ddcs-tuned", "learned": "learned-smart", "planner": "planner"}
-SHOWN: Final = ("ddcs-tuned", "learned-smart")
-"""Teams in the replay and the film."""
+SHOWN: Final = ("ddcs-tuned", "learned-smart")  # in the replay and the film
 SEED: Final = 7
 _PLANNED: Final = 5  # a world of the planner takes as long as many of a script: it plays one in so many
 _COMPILING: Final = 300.0  # s, at most

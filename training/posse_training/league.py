@@ -27,6 +27,7 @@ from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked, write_csv
 from posse_training.options import Changes, Pairs
+from posse_training.provenance import digests
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, TrainSettings
 
@@ -41,6 +42,7 @@ TEST_SEED: Final = 7
 _SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
 _FREE: Final = ("generations", "responses", "episodes")
 """Settings that the command that resumes a league may change."""
+_ITS_OWN: Final = ("scenario", "overrides", "side", "team", "target", "steps", "seed", "start", "folder")
 _COLUMNS: Final = 4  # of targets, which fit into 80 characters
 
 
@@ -87,6 +89,8 @@ class LeagueSettings:
             for label in labels:
                 if re.fullmatch(r"(trackers|target)-\d+|response to .*", label):
                     raise SettingsError(f"{label!r:.80} is how a member that is trained is called: rename the file")
+        for name in self.training.keys() & _ITS_OWN:
+            raise SettingsError(f"training: {name} is for the league to set: use its own options, such as --team-steps")
         for each in (*self.teams, *self.targets, str(self.path)):
             if "," in each:
                 raise SettingsError(f"{each!r:.80} must be without commas, which stand between opponents: rename it")
@@ -259,6 +263,7 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         pairings(found.training(side, settings.path, ",".join(others)))
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
+        held |= digests((*settings.teams, *settings.targets))
         hold_settings(settings.path / "league.json", held, _FREE)
         found.play()
         write_results(found)

@@ -7,11 +7,14 @@ import hashlib
 import importlib.util
 import platform
 import subprocess
+import sys
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
 import posse
+from posse_baselines.registry import is_code
 
 _SUFFIXES: Final = (".py", ".json", ".safetensors", ".toml")
 
@@ -45,6 +48,13 @@ def installed() -> str:
     ours = "".join(map(sources, ("posse", "posse_baselines", "posse_training")))
     versions = software("numpy", "numba", "llvmlite") | {"sources": hashlib.sha256(ours.encode()).hexdigest()[:12]}
     return ", ".join(f"{name} {value}" for name, value in versions.items())
+
+
+def digests(policies: Iterable[str]) -> dict[str, str]:
+    """Return ``digest of NAME`` of each loaded policy that is a file or code: a run goes on with the same ones."""
+    files = {name: Path(str(sys.modules[name.split(":")[0]].__file__) if is_code(name) else name) for name in policies}
+    contents = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
+    return {f"digest of {name}": hashlib.sha256(content).hexdigest()[:12] for name, content in contents.items()}
 
 
 @functools.cache

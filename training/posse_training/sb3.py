@@ -64,17 +64,14 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         normalize: VecNormalize | None = None,
         safeguard: bool = False,
     ) -> None:
-        self.model = model
+        self.model, self.message_size = model, message_size
         self.name = name or type(model).__name__
-        self.message_size = message_size
-        self._encoding = encoding
-        self._normalize = normalize
-        self._safeguard = safeguard
+        self._encoding, self._normalize, self._safeguard = encoding, normalize, safeguard
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
             raise PolicyError(
-                f"a model with observations {model.observation_space} plays no team: it must have "
-                "learned on (F,) or (N, F)"
+                f"a model with observations {model.observation_space} plays no team: it must have learned on (F,) or "
+                "(N, F)"
             )
         self._discrete = isinstance(model.action_space, (spaces.Discrete, spaces.MultiDiscrete))
         self.whole_team = len(shape) == 2
@@ -88,10 +85,9 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         got = (layout.scenario.num_trackers, size) if self.whole_team else (size,)
         if wanted != got:
             raise PolicyError(
-                f"policy {self.name!r} learned on observations {wanted}, and those of scenario "
-                f"{layout.scenario.name!r} with message_size={layout.scenario.message_size} are "
-                f"{got}: give from_sb3 the message_size that it learned with, and the scenario "
-                "its settings"
+                f"policy {self.name!r} learned on observations {wanted}, and those of {layout.scenario.name!r} "
+                f"with message_size={layout.scenario.message_size} are {got}: give from_sb3 the message_size that it "
+                "learned with, and the scenario its settings"
             )
         rows = num_worlds * (1 if self.whole_team else layout.scenario.num_trackers)
         guard = Guard(layout, num_worlds) if self._safeguard else None

@@ -55,8 +55,7 @@ class PosseEnv(EnvBase):
         device: Device of the tensors; any but the CPU costs a copy each way at each step.
         state: Whether the full state of each world comes with the observations, under ``"state"``,
             for centralized critics.
-        discrete_actions: Whether actions are numbers of
-            :data:`posse.adapters.actions.MOTIONS`, as in the other environments.
+        discrete_actions: Whether actions are numbers of :data:`posse.adapters.actions.MOTIONS`, as elsewhere.
         safeguard: Whether the trackers' actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
@@ -142,8 +141,7 @@ class PosseEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
 
-        ``seed`` and ``options`` (start poses) of :meth:`reset` are those of
-        :meth:`posse.Batch.reset`.
+        ``seed`` and ``options`` (start poses) of :meth:`reset` are those of :meth:`posse.Batch.reset`.
         """
         seed, options = kwargs.get("seed", self._seed), kwargs.get("options")
         mask = np.ones(self.batch.num_worlds, np.bool_)
@@ -164,9 +162,8 @@ class PosseEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         if tensordict.get("_step", None) is not None:
             raise NotImplementedError(
-                "the worlds of a PosseEnv are always stepped together: use rollout(..., "
-                "break_when_any_done=False), which resets worlds that are done, instead of "
-                "break_when_all_done=True"
+                "the worlds of a PosseEnv are always stepped together: use rollout(..., break_when_any_done=False), "
+                "which resets worlds that are done, instead of break_when_all_done=True"
             )
         by_group = [tensordict.get((group, "action")) for group in self._rows]
         together = by_group[0] if len(by_group) == 1 else torch.cat(by_group, dim=1)

@@ -27,13 +27,13 @@ from posse_baselines.files import read_json, write_json
 from posse_baselines.tuned import FORMAT
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.episodes import Match, play_shard
-from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.evaluation import guarded, progress_bar
 from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import Estimate, mean
 from posse_training.files import hold_settings, intact, locked
 from posse_training.options import Ray
 from posse_training.parallel import all_on_ray, connected
-from posse_training.provenance import commit, software
+from posse_training.provenance import commit, digests, software
 
 Point = npt.NDArray[np.float64]
 STATE: Final = "state.json"
@@ -155,7 +155,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     run, folder = _Run(settings, console or Console()), settings.folder
     held = {name: value for name, value in asdict(settings).items() if name not in _FREE}
     held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
-    held["tunables"] = [list(each) for each in run.tunables]
+    held |= {"tunables": [list(each) for each in run.tunables], **digests([settings.policy])}
     with connected(settings.ray), locked(folder):
         hold_settings(folder / "settings.json", held, results=(RESULT,))
         write_json(folder / RESULT, run.play())
@@ -252,7 +252,7 @@ class _Run:
         teams = [self.policy.with_settings(**values) for values in candidates]
         calls = [(Match(team, None, self.scenario, seed, split), worlds) for team in teams]
         if self.settings.ray is False:
-            return [play_shard(*call) for call in calls]
+            return [guarded(None, partial(play_shard, *call)) for call in calls]
         return all_on_ray(partial(play_shard, num_threads=1), calls)
 
     def _effective(self) -> list[str]:

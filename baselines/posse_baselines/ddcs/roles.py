@@ -1,11 +1,10 @@
 """What the trackers agree on: who leads (section 3.5), and who takes which slot.
 
 **Leader** (centralized model). A claim is a pair (term, leader). Every tracker broadcasts the claim that it holds and
-adopts a better one that it receives: the higher term; for equal terms, the lower leader number. Two events
-create a higher term: the leader finds another tracker clearly nearer to the target and hands over
-(the nearest-neighbour rule, every time lag), or a tracker has not heard of the leader for too long
-and appoints the nearest one that it knows. A connected radio graph thus converges to one claim, and
-two parts that meet again agree on the higher one.
+adopts a better one that it receives: the higher term; for equal terms, the lower leader number. Two events create a
+higher term: the leader finds another tracker clearly nearer to the target and hands over (the nearest-neighbour rule,
+every time lag), or a tracker has not heard of the leader for too long and appoints the nearest one that it knows. A
+connected radio graph thus converges to one claim, and two parts that meet again agree on the higher one.
 
 There is a leader from the first step on: while the target is unknown, every tracker appoints itself, and the lowest
 number wins. A tracker that hears no other leads itself (rule ii) under a lower term, so that it yields when it meets a

@@ -39,8 +39,7 @@ class Settings:
     spread: float = number(0.0, "", 0.0, 0.1)
     """By how much K differs from the mean at both ends of a distributed team, η in the paper."""
     follower_frame: Literal["leader", "slot-frame"] = "leader"
-    """Frame in which a follower's φ_d is constant: the leader's heading (figure 6) or the slot
-    frame."""
+    """Frame in which a follower's φ_d is constant: the leader's heading (figure 6) or the slot frame."""
     radio: bool = True
     """Whether received messages are used."""
     forbidden: tuple[str, ...] = ()

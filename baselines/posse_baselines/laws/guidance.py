@@ -10,9 +10,8 @@ the indices i (target) and i+1 (tracker), which are written out:
 ``delta``   rad    deviation of a heading from the line of sight, ``θ - σ``: (1), (2)
 ==========  =====  ============================================================
 
-One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1),
-deviation c and range r_d. With the pair (σ_d, θ_d), c = θ_d - K σ_d, it is continuous where
-σ passes ±π::
+One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1), deviation c and range r_d.
+With the pair (σ_d, θ_d), c = θ_d - K σ_d, it is continuous where σ passes ±π::
 
     θ = θ_d + K wrap(σ - σ_d)
 

@@ -1,1 +1,1 @@
-"""Policies without a decision system: simple ones, pursuit, the planner."""
+"""Policies that are no setting of the DDCS: simple ones, pursuit, the planners; targets that read nothing."""

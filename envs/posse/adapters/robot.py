@@ -88,7 +88,7 @@ class Robot:
     Attributes:
         scenario: Its settings, in scenario metres.
         layout: The layout of its observation.
-        steps: Observations since the start, less one.
+        steps: Control steps since the first observation; -1 before it.
 
     Raises:
         ScenarioError: An invalid setting, or a sensor that measures bearings alone.
@@ -218,7 +218,10 @@ class Robot:
             )
         return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._told, fix)
 
-    def _checked(self, message: Heard) -> Heard:
+    def _checked(self, given: Any) -> Heard:
+        if not isinstance(given, (tuple, list)) or not 6 <= len(given) <= len(Heard._fields):
+            raise ValueError(f"heard {given!r:.80}: give a list of posse.Heard, as broadcast() returns them")
+        message = Heard(*given)  # also of JSON's list
         said = tuple(message.message)
         _finite("a message heard", (*message[1:6], *said), (5 + len(said),))
         _check_age(message.age)

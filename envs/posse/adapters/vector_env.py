@@ -24,11 +24,10 @@ _Info = dict[str, Any]
 class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     """``posse/Team-v0`` as a vector environment: E worlds, one agent controls the team in each.
 
-    As :class:`posse.adapters.gymnasium_env.TeamEnv`, with a leading axis E.
-    World i is world ``first_world + i`` of the seed, so ``reset(seed=s)`` gives E different worlds.
-    Infos have the form of ``gymnasium.vector.SyncVectorEnv``: for each entry an array over the
-    worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
-    :class:`TeamEnv`.
+    As :class:`posse.adapters.gymnasium_env.TeamEnv`, with a leading axis E. World i is world ``first_world + i`` of the
+    seed, so ``reset(seed=s)`` gives E different worlds. Infos have the form of ``gymnasium.vector.SyncVectorEnv``: for
+    each entry an array over the worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as
+    in :class:`TeamEnv`.
 
     Args:
         scenario: Name of a scenario, or a scenario.

@@ -60,16 +60,14 @@ class Batch(OwnArrays):
     Args:
         scenario: Settings of the worlds, or their name.
         num_worlds: E, at least 1.
-        seed: Seed of all random draws, in [0, 2**63). World i of a seed is the same world in every
-            batch.
+        seed: Seed of all random draws, in [0, 2**63). World i of a seed is the same world in every batch.
         split: ``"train"``, ``"validation"`` or ``"test"``: part of the key of every draw, so that
             the splits have no world in common.
         first_world: Index of the batch's first world; that of the last must be below 2**63.
             ``first_world=17, num_worlds=1`` replays world 17 alone.
-        autoreset: Behaviour at the end of an episode. ``"next_step"``: the following step starts
-            the next episode and ignores its action; ``"same_step"``: the next episode starts at
-            once, and the last observation is in ``infos["final_obs"]``; ``"disabled"``: the caller
-            resets, with ``options={"reset_mask": mask}``.
+        autoreset: Behaviour at the end of an episode. ``"next_step"``: the following step starts the next episode and
+            ignores its action; ``"same_step"``: the next episode starts at once, and the last observation is in
+            ``infos["final_obs"]``; ``"disabled"``: the caller resets, with ``options={"reset_mask": mask}``.
         num_threads: Threads that step the worlds; default: one per core. Never changes a result.
         clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
 
@@ -246,9 +244,8 @@ class Batch(OwnArrays):
 
         Raises:
             ResetNeeded: A mask at the first reset.
-            ValueError: An unknown option, or one of a wrong shape or not finite; start poses in
-                which robots overlap each other, an obstacle or a wall, or a scripted target has no
-                room to turn. Nothing is changed.
+            ValueError: An unknown option, or one of a wrong shape or not finite; start poses in which robots overlap
+                each other, an obstacle or a wall, or a scripted target has no room to turn. Nothing is changed.
             ScenarioError: The scenario is too tight for a start to be drawn. Nothing is changed.
         """
         given = options_of(options)
@@ -325,18 +322,16 @@ class Batch(OwnArrays):
                 to 1e-6 outside, which may result from rounding, are clipped.
 
         Returns:
-            observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            Infos have the same keys at every step: ``"score"`` (E,) of the team in this step, [0, 1];
-            ``"reward/<term>"`` (E, rows), each reward term, unscaled (``posse.REWARD_TERMS``);
-            ``"metrics/<metric>"`` (E,), each metric of the episode (``posse.METRICS``), 0 where it goes on;
-            ``"working"`` (E, N), only in scenarios where trackers break. With autoreset ``"same_step"``
-            also ``"final_obs"`` (E, rows, F), the observations before new episodes start. Arrays are
-            never overwritten later.
+            observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos. Infos have the same
+            keys at every step: ``"score"`` (E,) of the team in this step, [0, 1]; ``"reward/<term>"`` (E, rows), each
+            reward term, unscaled (``posse.REWARD_TERMS``); ``"metrics/<metric>"`` (E,), each metric of the episode
+            (``posse.METRICS``), 0 where it goes on; ``"working"`` (E, N), only in scenarios where trackers break. With
+            autoreset ``"same_step"`` also ``"final_obs"`` (E, rows, F), the observations before new episodes start.
+            Arrays are never overwritten later.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
-            ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is
-                changed.
+            ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is changed.
             ScenarioError: The scenario is too tight for the start of a next episode to be drawn; only a reset helps.
         """
         self.check_running()

@@ -1,7 +1,7 @@
 """A control step of one world, and the kernels that step all worlds.
 
-Order: actions, faults, target's decision, physics (target first, then trackers by number), slot
-frame, contacts, sensing, radio, score, reward, end of the episode, observation.
+Order: faults, actions, target's decision, physics (target first, then trackers by number), slot
+frame, contacts, sensing, radio, score, end of the episode, reward, observation.
 
 Only the kernels at the end loop over a batch; the other functions process one world, or eight that
 are observed together.
@@ -82,9 +82,8 @@ def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Reco
         if seeing < c.num_trackers:  # otherwise all have a fix of this step
             share_fixes(c, trackers)
     else:
-        broadcast, message = worlds.broadcast[e], worlds.message[e]
-        send(c, w, trackers, worlds.odometry[e], broadcast)
-        hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
+        send(c, worlds, e)
+        hear(c, worlds, e)
 
 
 @compiled

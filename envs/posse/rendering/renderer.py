@@ -33,9 +33,8 @@ class Renderer:
 
     Args:
         scenario: Scenario of the batches to draw.
-        mode: ``"rgb_array"``: frames are returned, no display is needed; ``"human"``: they appear
-            in a window, in real time, which the user can pause, step, slow down and close
-            (:class:`posse.rendering.canvas.Window`).
+        mode: ``"rgb_array"``: frames are returned, no display is needed; ``"human"``: they appear in a window, in real
+            time, which the user can pause, step, slow down and close (:class:`posse.rendering.canvas.Window`).
         size: Width and height of a frame, px.
         title: Shown above the frame; default: the scenario's name.
         keys: Keys of the window that are the caller's own, and what they do.

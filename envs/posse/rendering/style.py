@@ -1,8 +1,7 @@
 """The style of frames: colours, and lengths in points.
 
-The hues are Okabe and Ito's, which colour-blind people tell apart. The target, its slots and its
-frame are vermilion, the team grey or blue. A *point* is a pixel in a frame whose shorter side is
-:data:`DESIGN_SIZE`.
+The hues are Okabe and Ito's, which colour-blind people tell apart. The target, its slots and its frame are vermilion,
+the team grey or blue. A *point* is a pixel in a frame whose shorter side is :data:`DESIGN_SIZE`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Contact: no disc enters or passes through another, at any speed.
 
-Robots move sequentially, target first. Each move is swept along the chord of its arc and stops
+Robots near something move sequentially, target first. Each move is swept along the chord of its arc and stops
 before contact with another disc or a wall; a blocked robot stays in place until its heading is
 free. A contact is counted once, when it begins, and by kind.
 """

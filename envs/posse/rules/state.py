@@ -1,8 +1,8 @@
 """The state of a batch: records with a leading axis E, with the meaning of each field.
 
-E = worlds, N = trackers, M = obstacles, D = radio delay in steps, m = message size. The data of one
-world are contiguous, for locality of memory access. The dtypes do not depend on any size, so
-kernels are compiled once for all scenarios.
+E = worlds, N = trackers, M = obstacles, D = radio delay in steps, m = message size. In each array the data of one world
+are contiguous, for locality of memory access. The dtypes do not depend on any size, so kernels are compiled once for
+all scenarios of the same declarations.
 
 A thread's scratch memory is one record whose fields are float32 arrays. Loops run over blocks of eight, so their
 lengths are multiples of eight, including padding of the last block.

@@ -133,6 +133,8 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
         base = Family(name=base, base=get_scenario(start), ranges=tuple(ranges.items()), meaning=meaning)
     ranges, rest, kinds = dict(base.ranges) if isinstance(base, Family) else {}, {}, Scenario.settings()
     for setting, value in settings.items():
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
         of_several = setting in kinds and kinds[setting].kind.startswith(("tuple", "Mapping"))
         if isinstance(value, (tuple, list)) and not of_several:
             ranges[setting] = tuple(value)

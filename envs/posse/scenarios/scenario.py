@@ -72,10 +72,9 @@ _WEIGHT: Final = ("1", -1e6, 1e6)  # terms are below 1e4, so sums stay far below
 class Scenario:
     """One benchmark: team, target, environment, sensing, radio, faults and reward.
 
-    Lengths are in metres, times in seconds, speeds in m/s, angles in radians, turn rates in rad/s.
-    Every field can be overridden by keyword: ``posse.parallel_env("smart", num_trackers=8)``.
-    :meth:`settings` lists the fields with unit, range and meaning. An invalid field, or one that does not fit the
-    others, is a :class:`ScenarioError`.
+    Lengths are in metres, times in seconds, speeds in m/s, angles in radians, turn rates in rad/s. Every field can be
+    overridden by keyword: ``posse.parallel_env("smart", num_trackers=8)``. :meth:`settings` lists the fields with unit,
+    range and meaning. An invalid field, or one that does not fit the others, is a :class:`ScenarioError`.
     """
 
     name: str = setting(dataclasses.MISSING, "name in results and policy cards")
@@ -357,8 +356,7 @@ class Scenario:
         wedge      the first slot straight behind the target, the others alternating on two wings that
                    extend backwards at 45 degrees, ``formation_spacing`` apart
         ring       evenly around the target, the first slot behind it; the radius grows with the team so
-                   that neighbours are ``formation_spacing`` apart, and is at least
-                   ``formation_distance``
+                   that neighbours are ``formation_spacing`` apart, and is at least ``formation_distance``
         rows       a block behind the target, as wide as deep, ``formation_spacing`` apart
         ========== ====================================================================================
         """

@@ -1,8 +1,7 @@
 """The one generator: compiled functions for the declarations of a scenario, as readable source text.
 
-numba cannot loop over a tuple of functions, since each function has a type of its own. So the
-functions below are written out, with one line for each declared function that they call.
-:func:`posse.kernel_source` returns the text.
+numba cannot loop over a tuple of functions, since each function has a type of its own. So the functions below are
+written out, with one line for each declared function that they call. :func:`posse.kernel_source` returns the text.
 """
 
 from __future__ import annotations

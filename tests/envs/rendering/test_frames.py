@@ -82,8 +82,7 @@ def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
 def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
     code = (
         "import sys, posse; print('pygame' in sys.modules);"
-        "from posse.rendering.renderer import Renderer; import pygame;"
-        "b = posse.batch('constant'); b.reset();"
+        "from posse.rendering.renderer import Renderer; import pygame; b = posse.batch('constant'); b.reset();"
         "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init());"
         "pygame.quit(); Renderer(b.scenario).draw(b)"  # as other environments do when they are closed
     )

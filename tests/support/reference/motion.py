@@ -24,8 +24,7 @@ def free_motion(
 ) -> tuple[Complexes, Complexes, Array]:
     """Return all positions and headings after a step without contacts.
 
-    And the speed and turn rate of the trackers, (2, N). What a scripted target decided is read off
-    ``after``.
+    And the speed and turn rate of the trackers, (2, N). What a scripted target decided is read off ``after``.
     """
     n, count = s.num_trackers, s.physics_steps
     dt = s.control_step / count

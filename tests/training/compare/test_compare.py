@@ -103,8 +103,7 @@ def test_a_policy_that_cannot_play_is_left_out_with_a_line(
     command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
     options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
     assert main([*command, *options]) == 0
-    shown = " ".join(capsys.readouterr().out.split())
-    assert "left out: any-0 on few-beams:" in shown
+    assert "left out: any-0 on few-beams:" in " ".join(capsys.readouterr().out.split())
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     left_out = [(row["what"], row["policy"]) for row in summary["left_out"]]
     assert left_out == [("few-beams", "any-0")]

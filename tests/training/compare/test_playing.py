@@ -30,7 +30,7 @@ def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
 
 @pytest.mark.long
 def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
-    names = ("Raises", "Nan", "Crashes")
+    names = ("Raises", "Nan", "Builds", "Crashes")
     settings = settings_for(tmp_path, *names)
     same = "posse_baselines.policies.simple:Pursuit"
     found = compare(replace(settings, policies=(*settings.policies, same)))
@@ -40,9 +40,11 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     assert "LocalError: [bold]local[/bold]" in why["Raises"]
     assert "bad_policies.py, line" in why["Raises"]
     assert "nan" in why["Nan"]
+    assert "unknown scenario 'nope'" in why["Builds"]
     assert "exit code 9" in why["Crashes"]
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["failed"] == found.failed
+    beaten = compare(replace(settings_for(tmp_path / "target"), target=f"{BAD}Crashes"))
+    assert ["exit code 9" in row["why"] for row in beaten.failed] == [True, True]
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["failed"] == found.failed
     # The rows are those of a comparison without the failures, and code plays as it would in this process.
     assert found.rows[:2] == compare(settings_for(tmp_path / "alone")).rows
     there, here = (found.plays["constant", policy]["score"] for policy in (same, "pursuit"))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from tests.support.replays import short
 
 import posse
@@ -93,6 +94,9 @@ def test_contacts_are_told_with_who_touched_what() -> None:
     """Two trackers run into each other, part, and one runs into the target."""
     batch = posse.batch("constant", 1, num_trackers=2, target_motion="agent", horizon=80)
     recorder = Recorder(batch, RECORD)
+    for call in (recorder.trajectory, lambda: recorder.step(np.zeros((1, 3, 2)))):
+        with pytest.raises(ResetNeeded, match="its own reset"):
+            call()
     recorder.reset(options={"tracker_pose": [(0, 0, 0), (1, 0, np.pi)], "target_pose": (-3, 0, 0)})
     still, ahead, right_about = [-1, 0], [1, 0], [-1, 1]
     for speed, turn, steps in ((ahead, ahead, 8), (right_about, still, 16), (ahead, still, 40)):
@@ -113,8 +117,7 @@ def test_ticks_agree_with_the_metrics() -> None:
     results = evaluate(policy, "leader-loss", 6, seed=4, progress=False)
     for world in range(6):
         player = record([policy], "leader-loss", seed=4, world=world).players[0]
-        counts = Counter(event.kind for event in player.events)
-        assert counts["break"] == 1
+        assert Counter(event.kind for event in player.events)["break"] == 1
         broken = next(event for event in player.events if event.kind == "break")
         column = player.columns["tracker_broken"][:, broken.robots[0]]
         assert column[broken.step] == 1

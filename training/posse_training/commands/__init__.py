@@ -1,1 +1,1 @@
-"""The commands ``train``, ``watch``, ``export``, ``scenarios`` and ``policies``."""
+"""The commands ``train``, ``watch``, ``replay``, ``export``, ``scenarios`` and ``policies``."""

@@ -77,9 +77,8 @@ def export(policy: LearnedPolicy, out: str | Path) -> None:
 def columns(policy: LearnedPolicy) -> dict[str, list[str]]:
     """Return the names of the columns of each input, in order, and of the output, which is the last.
 
-    Inputs are ``features``, ``observation`` and an adviser's ``proposal``, where the policy reads them.
-    The output is the ``action``, the ``wanted_velocity`` that the safeguard carries out, or the ``correction`` of a
-    proposal.
+    Inputs are ``features``, ``observation`` and an adviser's ``proposal``, where the policy reads them. The output is
+    the ``action``, the ``wanted_velocity`` that the safeguard carries out, or the ``correction`` of a proposal.
     """
     encoding, network = policy.encoding, policy.network
     motion = ["ahead", "left"] if policy.adviser or policy.safeguard else ["speed", "turn_rate"]

@@ -1,7 +1,7 @@
 """``posse compare``: policies on the same worlds, with intervals and paired differences.
 
-Policies of the package and policy files play in this process. One that is code, ``package.module:Class``, plays in a
-process of its own, which is ended at the time limit. That is no sandbox.
+Policies of the package and policy files play in this process. Code, ``package.module:Class``, of a policy or the target
+plays in a process of its own, which is ended at the time limit. That is no sandbox.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ from posse_baselines import Policy, PolicyError, load_target
 from posse_baselines.fields import number
 from posse_training.compare.contenders import PLANNER, Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
-from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
+from posse_training.errors import SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import (
+    FAILURES,
     Evaluation,
     evaluate,
     gathered_results,
     guarded,
+    has_code,
     played_errors,
     prepare,
     progress_bar,
@@ -77,8 +79,7 @@ class Settings:
     """Largest number of the worlds that the planner plays as a reference; 0: none. It takes about
     0.4 s of processor time per world. If named among the policies, it plays all worlds."""
     export: tuple[Literal["marl-eval"], ...] = ()
-    """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
-    and rliable read."""
+    """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval and rliable read."""
     time_limit: float = number(1800.0, "s", 0.001, 10.0**9)
     """Time limit of a policy that is code, on one scenario, for each training seed, s (with --ray: of a shard of
     500 worlds); one that exceeds it is stopped and skipped on the remaining scenarios."""
@@ -199,7 +200,7 @@ class Comparison:
                         check_code(policy)
                     with played_errors():
                         ready[key] = prepare(policy, scenario, self.episodes(contender), time_limit=limit, **self.place)
-                except (PolicyError, PlayError) as error:
+                except (PolicyError, *FAILURES) as error:
                     self.played[key] = error
         total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
         with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
@@ -255,7 +256,7 @@ class Comparison:
         except TimeLimitError as error:  # the next scenario would most likely take as long
             self.stopped[label] = f"not played: on {scenario.name} {error}"
             self.failed.append({**why, "why": str(error)})
-        except PlayError as error:
+        except FAILURES as error:
             self.failed.append({**why, "why": str(error)})
         return None
 
@@ -270,8 +271,8 @@ class Comparison:
             yield found or guarded(self._limit(policy), play)
 
     def _limit(self, policy: Policy | str) -> float | None:
-        """Return the time limit of code, which plays in a process of its own."""
-        return self.settings.time_limit if isinstance(policy, str) else None
+        """Return the time limit of code, which plays in a process of its own, as do those whom it plays against."""
+        return self.settings.time_limit if has_code(policy, self.settings.target) else None
 
     def _stem(self, wanted: str) -> str:
         """Return a name of letters, digits and ``._-`` that no other file has, also where case is ignored."""
@@ -312,7 +313,7 @@ class Comparison:
                 replays.append(guarded(self._limit(policy), play))
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
             write_replay(join(replays), self.folder / name)
-        except (PolicyError, PlayError, SettingsError) as error:
+        except (PolicyError, *FAILURES) as error:
             return "", f"no replay: {error}"
         return name, ""
 

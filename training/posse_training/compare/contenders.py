@@ -30,8 +30,7 @@ class Contender:
 
     Attributes:
         label: The label.
-        policies: Loaded policies; a string is ``package.module:Class``, loaded in the process that
-            plays it.
+        policies: Loaded policies; a string is ``package.module:Class``, loaded in the process that plays it.
     """
 
     label: str

@@ -18,9 +18,8 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
         raise SettingsError(
-            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be "
-            "biased: choose another of 'train', 'validation', 'test' than "
-            f"{', '.join(map(repr, trained))}"
+            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be biased: choose "
+            f"another of 'train', 'validation', 'test' than {', '.join(map(repr, trained))}"
         )
 
 

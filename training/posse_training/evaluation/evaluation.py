@@ -26,6 +26,8 @@ from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
 WORLDS: Final = 500
 """Worlds that are played at once; on a cluster a shard. No policy that ships depends on it."""
+FAILURES: Final = (PlayError, SettingsError, ScenarioError)
+"""Errors of one that plays, beside a ``PolicyError``: it does not fit."""
 
 
 def evaluate(
@@ -49,8 +51,7 @@ def evaluate(
             play the same drawn scenario.
         episodes: Number of episodes; episode i is world i of the seed.
         seed: Seed of the worlds.
-        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
-            scenario's own motion.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the scenario's own motion.
         split: Split of the worlds; no training and no tuning uses ``"test"``.
         progress: Whether to show a bar.
         num_threads: Threads that step the worlds; never changes a result; on a cluster one a shard.
@@ -128,7 +129,12 @@ def prepare(
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
     match = Match(policy if is_name else loaded, opponent, scenario, seed, split)
-    return Evaluation(loaded, match, cut(int(episodes), WORLDS), time_limit)
+    return Evaluation(loaded, match, cut(int(episodes), WORLDS), time_limit if has_code(policy, target) else None)
+
+
+def has_code(*players: object) -> bool:
+    """Return whether one of some policies or targets is ``package.module:Class``."""
+    return any(isinstance(each, str) and is_code(each) for each in players)
 
 
 @contextmanager
@@ -147,9 +153,8 @@ def gathered_results(
 
 
 def _play_on_worker(match: Match, time_limit: float | None, shard: range) -> Arrays:
-    """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
-    is_apart = isinstance(match.policy, str) and is_code(match.policy)
-    found: Arrays = guarded(time_limit if is_apart else None, partial(play_shard, match, shard, num_threads=1))
+    """Play the worlds of a shard; with a time limit in a process of its own."""
+    found: Arrays = guarded(time_limit, partial(play_shard, match, shard, num_threads=1))
     return found
 
 
@@ -168,7 +173,7 @@ def played_errors() -> Iterator[None]:
         yield
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
-    except (PlayError, SettingsError, ScenarioError):
+    except FAILURES:
         raise
     except Exception as error:
         raise PlayError(describe(error)) from None

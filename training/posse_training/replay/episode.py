@@ -1,8 +1,7 @@
 """Contents of a replay: one world, and the episode of each player as named columns over time.
 
-A *frame* is the world at a control step: frame 0 is the start, frame T the end. Row t of a column
-is frame t. Actions and beliefs in row t are those of frame t; a reward term in row t is that of the
-step before it.
+A *frame* is the world at a control step: frame 0 is the start, frame T the end. Row t of a column is frame t. Actions
+and beliefs in row t are those of frame t; a reward term in row t is that of the step before it.
 """
 
 from __future__ import annotations
@@ -66,8 +65,7 @@ class Replay:
     """One world, played by one to four players.
 
     Attributes:
-        world: Common data of the players: scenario, seed, obstacles, ...; plain JSON, with
-            infinite numbers.
+        world: Common data of the players: scenario, seed, obstacles, ...; plain JSON, with infinite numbers.
         players: Left to right.
     """
 

@@ -43,11 +43,9 @@ def record(
     """Play one world with each policy.
 
     Args:
-        policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
-            (label, name or policy).
+        policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs (label, name or policy).
         scenario: Scenario or its name; ``message_size`` is raised to that of each policy.
-        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
-            scenario's own motion.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the scenario's own motion.
         seed: Seed of the world.
         world: Index of the world within the seed.
         split: ``"train"``, ``"validation"`` or ``"test"``.

@@ -58,9 +58,8 @@ class Display:
     def evaluated(self, point: Point) -> None:
         """Print results on the validation worlds, after as many steps as they say."""
         line = (
-            f"{int(point['steps']):>12,} steps  safe score {point['safe_score']:.3f} "
-            f"[{point['low']:.3f}, {point['high']:.3f}], score {point['score']:.3f}, "
-            f"contact-free {point['contact_free']:.2f}"
+            f"{int(point['steps']):>12,} steps  safe score {point['safe_score']:.3f} [{point['low']:.3f}, "
+            f"{point['high']:.3f}], score {point['score']:.3f}, contact-free {point['contact_free']:.2f}"
         )
         if self.beside is not None:
             line += f", {self._settings.beside} {self.beside:.3f}"

@@ -19,6 +19,7 @@ from posse_baselines.fields import number
 from posse_baselines.files import read_json
 from posse_training.errors import SettingsError, check_settings
 from posse_training.options import Changes, MaybeNames, Names, Pairs
+from posse_training.provenance import digests
 
 Point = dict[str, float]
 """Of a learning curve, by the columns of ``curve.csv``: agent steps, s, mean safe score and its 95 % interval, mean
@@ -204,7 +205,7 @@ class TrainSettings:
 
     def held(self) -> dict[str, Any]:
         """Return what must be the same when a run is resumed: the settings, and the versions of the scenarios."""
-        return {**self.to_dict(), "versions": [each.version for each in self.given]}
+        return {**self.to_dict(), "versions": [each.version for each in self.given], **digests(self.opponents)}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -213,7 +214,7 @@ class TrainSettings:
         Raises:
             SettingsError: An unknown setting, or an invalid value.
         """
-        fitted = {name: value for name, value in values.items() if name != "versions"}
+        fitted = {name: value for name, value in values.items() if not name.startswith(("versions", "digest of "))}
         known = {f.name for f in dataclasses.fields(cls)}
         for name in fitted:
             if name not in known:

@@ -29,10 +29,9 @@ _NEVER: Final = -1
 class TeamVecEnv(VecEnv):
     """Batches of worlds as one vector of slots, worlds x trackers.
 
-    Truncated slots are bootstrapped one call each, so episodes should not all end together: each
-    world's *first* episode is shortened, the e-th of E worlds to (e + 1) / E of the horizon, which
-    spreads all later ends evenly over time. A shortened episode is truncated and bootstrapped like
-    any other, but reports neither return nor metrics.
+    Truncated slots are bootstrapped one call each, so episodes should not all end together: each world's *first*
+    episode is shortened, the e-th of E worlds to (e + 1) / E of the horizon, which spreads all later ends evenly over
+    time. A shortened episode is truncated and bootstrapped like any other, but reports neither return nor metrics.
 
     Every array returned is new and is never overwritten.
 
@@ -42,8 +41,7 @@ class TeamVecEnv(VecEnv):
         encoding: Which inputs are read from an observation.
         safeguard: Whether actions are wanted velocities, which the safeguard carries out
             (:mod:`posse_baselines.safeguard`).
-        see_state: Append the state of the world, for a centralized critic
-            (:mod:`posse_training.train.world_state`).
+        see_state: Append the state of the world, for a centralized critic (:mod:`posse_training.train.world_state`).
 
     Attributes:
         batches: The batches, in the order of their slots.

@@ -12,7 +12,7 @@ from posse.numeric import ZERO, FloatArray, Record, Records, compiled
 from posse.rules.kinematics import turned
 from posse.rules.randomness import RADIO_LOSS, uniform
 from posse.rules.senses.sensing import take_fix
-from posse.rules.state import BIT, NEVER, NO_BITS
+from posse.rules.state import BIT, NEVER, NO_BITS, WorldArrays
 
 
 @compiled
@@ -48,37 +48,30 @@ def keep_messages(c: Record, w: Record, trackers: Records, actions: FloatArray, 
 
 
 @compiled
-def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: Records) -> None:
-    """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
-    slot = w.step % (c.radio_delay + 1)
-    for i in range(c.num_trackers):
-        t, b = trackers[i], broadcast[slot, i]
+def send(c: Record, worlds: WorldArrays, e: int) -> None:
+    """Write the broadcasts of all trackers of world e to its ring buffer (D + 1, N)."""
+    w, slot = worlds.world[e], worlds.world[e].step % (c.radio_delay + 1)
+    for i, t in enumerate(worlds.tracker[e]):
+        b = worlds.broadcast[e, slot, i]
         b.sent = radio_works(c, w, t)
         b.x, b.y, b.heading_cos, b.heading_sin = t.x, t.y, t.heading_cos, t.heading_sin
         b.speed, b.turn_rate = t.speed, t.turn_rate
         b.fix_step, b.fix = t.fix_step, t.fix
         if c.drifts != 0:
-            b.odometry = odometry[i]
+            b.odometry = worlds.odometry[e, i]
 
 
 @compiled
-def hear(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-) -> None:
-    """Deliver the broadcasts sent ``radio_delay`` steps ago to the trackers in range."""
+def hear(c: Record, worlds: WorldArrays, e: int) -> None:
+    """Deliver the broadcasts sent ``radio_delay`` steps ago to the trackers of world e in range."""
+    w, heard, broadcast = worlds.world[e], worlds.heard[e], worlds.broadcast[e]
     sent_at = w.step - c.radio_delay
     if sent_at < 0:
         return
     slot = sent_at % (c.radio_delay + 1)
     reach2 = c.radio_range * c.radio_range
     n = c.num_trackers
-    for i, t in enumerate(trackers):
+    for i, t in enumerate(worlds.tracker[e]):
         if not radio_works(c, w, t):
             continue
         for j in range(n):
@@ -99,7 +92,7 @@ def hear(
                 h.heading_cos, h.heading_sin = turned(b.heading_cos, b.heading_sin, b.odometry.cos, b.odometry.sin)
             h.speed, h.turn_rate = b.speed, b.turn_rate
             for k in range(c.message_size):
-                heard_message[i, j, k] = message[slot, j, k]
+                worlds.heard_message[e, i, j, k] = worlds.message[e, slot, j, k]
             if b.fix_step > t.fix_step and c.fix_bearing == 0:
                 take_fix(c, t, b)
 
