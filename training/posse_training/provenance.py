@@ -52,7 +52,8 @@ def installed() -> str:
 
 def digests(policies: Iterable[str]) -> dict[str, str]:
     """Return ``digest of NAME`` of each loaded policy that is a file or code: a run goes on with the same ones."""
-    files = {name: Path(str(sys.modules[name.split(":")[0]].__file__) if is_code(name) else name) for name in policies}
+    loaded = {name: getattr(sys.modules[name.split(":")[0]], "__file__", "") for name in policies if is_code(name)}
+    files = {name: Path(loaded.get(name, name) or "") for name in policies}
     contents = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
     return {f"digest of {name}": hashlib.sha256(content).hexdigest()[:12] for name, content in contents.items()}
 

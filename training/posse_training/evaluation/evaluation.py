@@ -26,8 +26,7 @@ from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
 WORLDS: Final = 500
 """Worlds that are played at once; on a cluster a shard. No policy that ships depends on it."""
-FAILURES: Final = (PlayError, SettingsError, ScenarioError)
-"""Errors of one that plays, beside a ``PolicyError``: it does not fit."""
+FAILURES: Final = (PlayError, SettingsError, ScenarioError)  # of one that plays; with a PolicyError it does not fit
 
 
 def evaluate(
