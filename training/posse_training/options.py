@@ -128,7 +128,7 @@ class Worlds:
 
 @dataclass(frozen=True, kw_only=True)
 class OneWorld(Worlds):
-    """One of them."""
+    """One world of a scenario."""
 
     world: int = 0
     """Index of the world within the seed."""

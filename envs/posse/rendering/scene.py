@@ -52,7 +52,7 @@ class Scene:
         self.sees = of["tracker_sees"] != 0  # (N,) its own sensor sees the target
         since = self.step - of["tracker_sensor_dead_from"].astype(np.int64)
         self.senses = ~self.broken & ((since < 0) | (since >= s.outage_steps))  # (N,) its sensor works
-        self.struck = of["tracker_onsets"] > 0  # (N,) a contact began in this step
+        self.touched = of["tracker_onsets"] > 0  # (N,) a contact began in this step
         heard = of["heard_step"] > max(self.step - s.radio_delay - _LINK_SHOWN, -1)  # just now
         self.links = heard | heard.T  # (N, N); (0, 0) where the radio is perfect
         self.obstacles = points("obstacle_x", "obstacle_y", "obstacle_radius")  # (M, 3)
@@ -96,4 +96,4 @@ class History:
         """Return place (2,) m and age, 0 now, 1 at the end, of the contacts that have just begun."""
         now = self._scenes[-1].time
         recent = [s for s in self._scenes if now - s.time < _FLASH_TIME]
-        return [(place, (now - s.time) / _FLASH_TIME) for s in recent for place in s.position[s.struck]]
+        return [(place, (now - s.time) / _FLASH_TIME) for s in recent for place in s.position[s.touched]]
