@@ -184,7 +184,7 @@ MIND: Final = record(
     # tracking
     task=_I(0),
     slot=_I(-1),  # -1: none
-    pull=_C(0),  # on a robot that searches, to where the target may be; its own heading pulls by 1
+    pull=_C(0),  # in a search, to where the target may be, beside the own heading's of 1; of scripts 0
     closing=_I(0),  # 1: the law itself, not the safeguard, keeps the range to the target
     side=_I(0),  # of the last detour: 1 left, -1 right
     side_step=_I(0),  # own step of that detour

@@ -1,8 +1,8 @@
 """The monitoring layer: one estimate of the target, a table of the team-mates, and the messages between them.
 
-Fixes may be delayed and come from team-mates; each is extrapolated to the present. Positions are
-noisy, so speed is estimated along the heading, averaged over seconds. Where
-commands are delayed, all is foreseen to the moment at which the next one is executed.
+Fixes may be delayed and come from team-mates; each is extrapolated to the present. Positions are noisy, so speed is
+estimated along the heading, averaged over seconds. Where commands are delayed, all is foreseen to the moment at which
+the next one is executed.
 """
 
 from __future__ import annotations

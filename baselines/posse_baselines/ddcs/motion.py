@@ -216,7 +216,7 @@ def follow(team: Team, me: Record, guide: Guide) -> None:
 
 @compiled
 def explore(team: Team, me: Record, mates: Records) -> complex:
-    """Return the velocity (m/s) of a tracker that searches: ahead, away from team-mates and from the borders.
+    """Return the velocity (m/s) of a tracker that searches: ahead, by its pull, away from team-mates and borders.
 
     On the open plane a lost target is searched for around its predicted position.
     """

@@ -37,11 +37,11 @@ _TURNS: Final = 0.4  # share of its turn limit from which a target is taken to t
 _GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
 _SLOPE_TRUST: Final = 2.0  # correction of a weave's cosine for each rad/s by which its turn rate was foreseen wrong
 _RATE_TRUST: Final = 0.1  # 1/s; correction of a weave's rate for each rad by which its phase was foreseen wrong
-_PARTICLES: Final = 300
-_BEND: Final = 0.5  # rad/s; standard deviation of their turn rates
-_FEW: Final = 0.05  # share of the particles that are left when all count again
-_PULL: Final = 0.5  # of the particles, where the own heading pulls by 1
 _SOON: Final = 0.8  # s; a turn that was not foreseen is a dart if one was due so soon
+_PARTICLES: Final = 300  # of each tracker: places between the walls where the target may be
+_BEND: Final = 0.5  # rad/s; standard deviation of the particles' turn rates
+_FEW: Final = 0.05  # share of unseen particles below which all count as unseen again
+_PULL: Final = 0.5  # of the particles in a search, where the own heading pulls by 1
 
 _SEEN: Final = record_type(
     ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
@@ -171,9 +171,9 @@ class Beliefs(Minds):
         return actions[rows, own, :2]
 
     def look_for(self) -> None:
-        """Set which way each tracker is drawn in its search: to the particles that it is nearest to.
+        """Set the pull on each tracker in its search: to unseen particles that no team-mate is nearer to.
 
-        Particles are where the target may be: they drive on arcs between the walls, until the team sees their place.
+        Particles drive on arcs at the target's speed, and turn back at walls, until they come into the range of sight.
         """
         s, me = self.layout.scenario, self.me.reshape(-1)
         lost = np.flatnonzero(me["known"] == 0)
@@ -322,7 +322,7 @@ class BeliefPlanner(DDCS):
     """Model-predictive control in a world that each tracker keeps from what it observes and is told.
 
     Where the target is known, a tracker plays the planner's choice for it in its own world; else it searches as
-    ``ddcs-tuned`` does, drawn to where the target may still be. Monitoring, messages and safeguard are of that, too.
+    ``ddcs-tuned`` does, pulled to where the target may still be. Monitoring, messages and safeguard are of that, too.
     """
 
     def __init__(self, settings: PlannerSettings | None = None) -> None:
@@ -330,7 +330,7 @@ class BeliefPlanner(DDCS):
         self.plans = settings
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return the settings of ``ddcs-tuned`` for a scenario, with the usual distances in the search."""
+        """Return the settings of ``ddcs-tuned`` for a scenario, but for ``apart``, which keeps its default."""
         return replace(tuned_settings("ddcs-tuned", scenario), apart=Settings.apart)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:

@@ -50,7 +50,8 @@ def keep_messages(c: Record, w: Record, trackers: Records, actions: FloatArray, 
 @compiled
 def send(c: Record, worlds: WorldArrays, e: int) -> None:
     """Write the broadcasts of all trackers of world e to its ring buffer (D + 1, N)."""
-    w, slot = worlds.world[e], worlds.world[e].step % (c.radio_delay + 1)
+    w = worlds.world[e]
+    slot = w.step % (c.radio_delay + 1)
     for i, t in enumerate(worlds.tracker[e]):
         b = worlds.broadcast[e, slot, i]
         b.sent = radio_works(c, w, t)
