@@ -57,7 +57,7 @@ INVALID = {
     "league --team": "teams=() must be one or more",
     "league --team a/best.json b/best.json": "must have different names",
     "league --team idle --target target-1.safetensors": "'target-1' is how a member that is trained is called",
-    "league --training seed=5": "training: seed is for the league to set",
+    "league --scenario nosuch --training seed=5": "training: seed is for the league to set",
     "submit pursuit --out new --name <script>": "name='<script>' must be at most 100 letters",
     "verify nowhere": "posse verify: [Errno 2] No such file or directory: 'nowhere/standing.csv'",
     "compare": "No policies given",
