@@ -8,8 +8,6 @@ Those of other libraries, ``recurrent-ppo`` of sb3-contrib and ``qmix`` of Bench
 ``make recipes`` makes: ``.venv-recipes/bin/python benchmarks/algorithms.py --algorithm qmix --safeguard False``.
 """
 
-from __future__ import annotations
-
 import csv
 import itertools
 from dataclasses import dataclass, replace

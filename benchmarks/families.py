@@ -3,8 +3,6 @@
 Prints a table and draws docs/media/families.svg.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -7,8 +7,6 @@ Each simulator runs in a virtual environment of its own, under ``.venv-peers/``,
 rewards. Writes benchmarks/peers.csv. To add one: a runner with a function ``build``, a file of pins, a row in PEERS.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

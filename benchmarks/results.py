@@ -3,8 +3,6 @@
 Writes benchmarks/standings.csv, which README and manual are made from. Rows of policies that do not ship stay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final

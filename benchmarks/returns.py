@@ -1,7 +1,5 @@
 """How the return of a training and the safe score go together, over test worlds: python benchmarks/returns.py."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import posse

@@ -5,8 +5,6 @@ without and with cached kernels. Median, least and greatest of five runs each. `
 checkout instead.
 """
 
-from __future__ import annotations
-
 import datetime as dt
 import json
 import os

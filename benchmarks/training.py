@@ -1,7 +1,5 @@
 """``make bench-training``: throughput of PPO on ``smart``, and how long it takes to beat the tuned script."""
 
-from __future__ import annotations
-
 import csv
 import tempfile
 from dataclasses import dataclass, replace

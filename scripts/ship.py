@@ -9,8 +9,6 @@ Then all play the worlds of the leaderboard, for the mean over training seeds. A
 reference team more than the scripted one.
 """
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import shlex

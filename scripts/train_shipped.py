@@ -3,8 +3,6 @@
 Finished runs are skipped, an interrupted one resumes. To use more cores, start it for several scenarios at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final

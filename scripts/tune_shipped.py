@@ -3,8 +3,6 @@
 python scripts/tune_shipped.py --again     only the checks of all that ship, after a scenario's version rose
 """
 
-from __future__ import annotations
-
 import json
 import shlex
 import sys

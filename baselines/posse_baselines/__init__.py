@@ -1,7 +1,5 @@
 """Policies that play without torch: scripted ones and shipped learned ones."""
 
-from __future__ import annotations
-
 from posse_baselines.ddcs import DDCS
 from posse_baselines.deploy import deploy
 from posse_baselines.fields import Tunable, tunables

@@ -1,7 +1,5 @@
 """A policy on one real robot."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,9 +1,7 @@
 """Settings that declare themselves: unit, range, and whether tuning may change them."""
 
-from __future__ import annotations
-
 import dataclasses
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 
 class Tunable(NamedTuple):
@@ -39,14 +37,14 @@ def _text(number: float) -> str:
 
 def check(settings: Any) -> None:
     """Raise ValueError if a field of a settings object has a value that its declaration does not allow."""
+    hints = get_type_hints(type(settings))
     for field in dataclasses.fields(settings):
-        name, value, meta = field.name, getattr(settings, field.name), field.metadata
-        is_choice = str(field.type).startswith("Literal[")
-        if is_choice and value not in (choices := get_args(get_type_hints(type(settings))[name])):
+        name, value, meta, hint = field.name, getattr(settings, field.name), field.metadata, hints[field.name]
+        if get_origin(hint) is Literal and value not in (choices := get_args(hint)):
             raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
-        if "low" not in meta or (value is None and "None" in str(field.type)):
+        if "low" not in meta or (value is None and type(None) in get_args(hint)):
             continue
-        whole = "int" in str(field.type)
+        whole = int in (hint, *get_args(hint))
         if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
             raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
         if not meta["low"] <= value <= meta["high"]:

@@ -1,7 +1,5 @@
 """Files are written as a whole, where they are named and nowhere else."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import secrets

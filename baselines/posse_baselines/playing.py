@@ -1,7 +1,5 @@
 """Play a policy in a batch and record what it did, or play it beside a PettingZoo environment."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -77,7 +75,7 @@ class Trajectory:
         start = f"{prefix}/"
         return {name.removeprefix(start): array for name, array in self.arrays.items() if name.startswith(start)}
 
-    def episode(self, world: int) -> Trajectory:
+    def episode(self, world: int) -> "Trajectory":
         """Return the first episode of one world: E = 1."""
         steps, one = int(self.lengths[world]), slice(world, world + 1)
         surplus = self.steps - steps  # rows after its end

@@ -10,8 +10,6 @@ All that a policy remembers is in ``memory``: one policy object may play any num
 memory passed to ``act`` or ``restart`` must not be used again; use the one that is returned.
 """
 
-from __future__ import annotations
-
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable

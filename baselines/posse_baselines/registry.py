@@ -3,8 +3,6 @@
 A target is a scripted motion of the scenario, or a policy that moves it: learned, or your own.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Callable, Mapping

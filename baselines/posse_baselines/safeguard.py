@@ -9,8 +9,6 @@ evades.
 :func:`Safeguard` puts the layer before an environment; :class:`Guard` is the layer itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

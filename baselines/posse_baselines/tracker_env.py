@@ -1,7 +1,5 @@
 """``posse/Tracker-v0``: the agent controls one tracker, its team-mates run a policy. One world, or many."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

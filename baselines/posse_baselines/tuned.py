@@ -3,8 +3,6 @@
 Their files are JSON, checked when read; they never run code.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping
 from dataclasses import replace
@@ -48,7 +46,7 @@ class TunedDDCS(DDCS):
         """Return the settings that are played on a scenario."""
         return replace(self.settings if self.card else tuned_settings(self.name, scenario), **self._changes)
 
-    def with_settings(self, **values: Any) -> TunedDDCS:
+    def with_settings(self, **values: Any) -> "TunedDDCS":
         """Return a policy whose tuned settings are changed so; ValueError if a value is out of its range."""
         changed = copy.copy(self)
         changed.settings, changed._changes = replace(self.settings, **values), {**self._changes, **values}
@@ -66,7 +64,7 @@ def tuned_files(name: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted((SHIPPED_TUNED / name).glob("*.json"))}
 
 
-def read_tuned(path: Path) -> TunedDDCS:
+def read_tuned(path: Path) -> "TunedDDCS":
     """Return the policy of a file of tuned settings; PolicyError if it is missing, damaged or not such a file."""
     try:
         card = read_json(path)

@@ -1,7 +1,5 @@
 """JaxMARL `MPE_simple_tag_v3`: 5 adversaries against 1 agent; worlds by vmap, steps by scan, compiled as a whole."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """mpe2 `simple_tag_v3`: 5 adversaries, 1 agent, through PettingZoo's parallel interface."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpe2 import simple_tag_v3
 from serve import ACTION_SETS, Built, serve

@@ -1,7 +1,5 @@
 """posse: a batch of worlds of 5 trackers; the variant is the scenario."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """posse through PettingZoo: one `smart` world of 5 trackers, with dictionaries by agent."""
 
-from __future__ import annotations
-
 import numpy as np
 from serve import ACTION_SETS, Built, serve
 

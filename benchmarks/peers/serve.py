@@ -13,8 +13,6 @@ between requests:
 This file requires only Python, since it runs in every peer's environment.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import resource

@@ -1,7 +1,5 @@
 """VMAS `simple_tag`: 5 adversaries against 1 agent, torch over the whole batch."""
 
-from __future__ import annotations
-
 import os
 
 import torch

@@ -1,7 +1,5 @@
 """The geometry of each law: what its symbols mean, on the axes of a figure."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final

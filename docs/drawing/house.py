@@ -6,8 +6,6 @@ Purposes (the first paragraph of a room's docstring) and sizes are read from the
 ``posse`` imports only rooms below it, which tests/test_imports.py checks.
 """
 
-from __future__ import annotations
-
 import ast
 import textwrap
 from pathlib import Path

@@ -6,8 +6,6 @@ The middle shows 10 s of one world of `accelerating` with starts 2 to 4 m from t
 how far each tracker is from the nearest slot or, in velocity pursuit, which has none, the target.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@
 With POSSE_NOTEBOOK_STEPS and POSSE_NOTEBOOK_EPISODES it trains and compares for less.
 """
 
-from __future__ import annotations
-
 import re
 import tempfile
 from dataclasses import dataclass

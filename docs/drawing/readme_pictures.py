@@ -7,8 +7,6 @@ of the last second. The world is no extreme: of the first 101, it has the median
 safe scores. The command prints what a caption may say.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

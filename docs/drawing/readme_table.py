@@ -3,8 +3,6 @@
 python docs/drawing/readme_table.py
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Final

@@ -5,8 +5,6 @@
 Its own drawing needs an older matplotlib.
 """
 
-from __future__ import annotations
-
 import runpy
 import sys
 from pathlib import Path

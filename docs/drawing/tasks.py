@@ -3,8 +3,6 @@
 python docs/drawing/tasks.py
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

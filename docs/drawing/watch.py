@@ -3,8 +3,6 @@
 python docs/drawing/watch.py
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tables of what the code declares: settings, observation fields, metrics, reward terms, defaults of a training."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Sequence

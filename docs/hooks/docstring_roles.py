@@ -1,7 +1,5 @@
 """Docstrings for the manual: roles such as :class:`Batch`, literal blocks and tables become Markdown."""
 
-from __future__ import annotations
-
 import re
 from typing import Any, Final
 

@@ -3,8 +3,6 @@
 A line ``{{ name arguments }}`` of a page is replaced by what the part of that name returns.
 """
 
-from __future__ import annotations
-
 import html
 import re
 import shlex

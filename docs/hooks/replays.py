@@ -1,7 +1,5 @@
 """The replays of the manual: played when it is built, and kept under ``build/replays`` until a source changes."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Who scores what: tables from ``benchmarks/*.csv`` and from the cards of the shipped policies."""
 
-from __future__ import annotations
-
 import csv
 import functools
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """posse: a team of unicycle robots finds, follows and holds formation on one mobile target."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from posse import declarations

@@ -1,7 +1,5 @@
 """``python -m posse``: the command line, as ``posse``."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 

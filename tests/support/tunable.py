@@ -1,7 +1,5 @@
 """A policy with one setting whose best value is known, and tunings of seconds."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +35,7 @@ class Biased(DDCS):
     def settings_for(self, scenario: Any) -> Any:
         return self._settings
 
-    def with_settings(self, **values: Any) -> Biased:
+    def with_settings(self, **values: Any) -> "Biased":
         return Biased(dataclasses.replace(self.bias, **values))
 
     def annotations(self, memory: Memory) -> Any:

@@ -4,8 +4,6 @@ Policies of BenchMARL learn from ``("agents", "observation")``, critics and mixe
 torchrl before 0.12.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 Each command is imported when it is called: listing the scenarios does not import torch.
 """
 
-from __future__ import annotations
-
 import argparse
 import difflib
 import importlib

@@ -1,7 +1,5 @@
 """``posse demo``: how a script, a learned team and the planner do, and a replay and a film of the first two."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

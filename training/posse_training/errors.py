@@ -1,7 +1,5 @@
 """Errors whose message is for the user: it names the value, what is allowed and the fix."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import traceback

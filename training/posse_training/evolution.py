@@ -10,8 +10,6 @@ The mirror image of a world is a world. The output ahead therefore reads only in
 and the output to the left only those that change it.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

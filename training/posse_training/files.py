@@ -1,7 +1,5 @@
 """Folders of runs: one process at a time writes to one, and resumes only a run with its own settings."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import fcntl

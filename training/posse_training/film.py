@@ -1,7 +1,5 @@
 """Films: teams side by side in the same world, as GIF or MP4."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import math

@@ -4,8 +4,6 @@ A standing is a row of ``benchmarks/standings.csv``. A submission is a folder wi
 and the policy file, if the policy is one.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -35,7 +33,7 @@ WORLDS: Final = 1000
 CLAIM: Final = "standing.csv"
 _TEXT: Final = re.compile(r"[A-Za-z0-9._:+ -]{0,100}")
 """What a text of a table may hold: it is shown on a page, and names a file beside the table."""
-_KINDS: Final[dict[Any, Callable[[str], Any]]] = {"str": str, "int": int, "float": float, "bool": json.loads}
+_KINDS: Final[dict[Any, Callable[[str], Any]]] = {str: str, int: int, float: float, bool: json.loads}
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class Standing:
     def __post_init__(self) -> None:
         check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
 
-    def agrees(self, other: Standing) -> bool:
+    def agrees(self, other: "Standing") -> bool:
         """Return whether the intervals of both safe scores overlap."""
         return self.low <= other.high and other.low <= self.high
 

@@ -3,8 +3,6 @@
 Everything is kept in the folder, so that the same command resumes a league that was interrupted at any moment.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@
 is the file or folder that is written to, ``--steps`` and ``--minutes`` say how long something goes on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final

@@ -4,8 +4,6 @@ A world depends on nothing but its index, and how worlds are cut into shards not
 cluster are those of one process, bit for bit, on processors of the same kind.
 """
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import hashlib

@@ -1,7 +1,5 @@
 """``posse play``: drive the target against a team, or one tracker in it, by the arrow keys."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What results depend on: the commit, the versions and the sources."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib.util

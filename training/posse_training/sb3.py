@@ -3,8 +3,6 @@
 Needs the extra ``training``.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from posse_training.errors import require

@@ -1,7 +1,5 @@
 """What figures share: colours, the look of each policy, notes and legends."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

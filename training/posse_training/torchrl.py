@@ -14,8 +14,6 @@ E = worlds, N = trackers, F = observation length, m = message size::
 If the target is an agent, it has its own group ``"target"``, with N = 1.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from posse_training.errors import require

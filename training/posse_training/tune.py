@@ -3,8 +3,6 @@
 The run folder holds ``state.json``, from which the same command resumes.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence

@@ -13,8 +13,6 @@ motor actuation       :mod:`~posse_baselines.ddcs.actuation`, then :mod:`posse_b
 PNGL + l-φ.
 """
 
-from __future__ import annotations
-
 from posse_baselines.ddcs.baseline import DDCS
 from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING, TASKS, Settings
 

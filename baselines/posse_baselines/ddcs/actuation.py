@@ -9,8 +9,6 @@ way, and keeps to the side that it began with.
 **Execution.** Where motion lags, more is commanded; delayed commands are remembered for monitoring.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

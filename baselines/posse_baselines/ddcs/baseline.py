@@ -24,8 +24,6 @@ The leader is the tracker nearest to the target (nearest-neighbour rule); it tak
 others take slots by least total time (:mod:`~posse_baselines.ddcs.roles`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Final
 
@@ -84,7 +82,7 @@ class DDCS(BasePolicy):
         """Return the settings that are played on a scenario."""
         return self.settings
 
-    def with_settings(self, **values: Any) -> DDCS:
+    def with_settings(self, **values: Any) -> "DDCS":
         """Return a policy with some settings changed; ValueError if a value is out of its range."""
         return DDCS(replace(self.settings, **values), self.name)
 

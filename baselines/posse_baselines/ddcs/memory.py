@@ -7,8 +7,6 @@ and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in com
 constants of their scenario, are converted once, to a unit of :func:`unit_of` metres.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

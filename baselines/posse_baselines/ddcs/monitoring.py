@@ -5,8 +5,6 @@ estimated along the heading, averaged over seconds. Where commands are delayed, 
 the next one is executed.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -11,8 +11,6 @@ leader exchange      another leader was appointed and has not been heard yet: ho
 A law sets the wanted velocity (m/s) for the safeguard, and the command to execute if the safeguard accepts it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -15,8 +15,6 @@ away know that the leader is alive.
 results. Otherwise, for example after lost messages, slots claimed in messages are respected.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Every setting of the Distributed Decision Control System, with unit, range and use in tuning."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, Literal
 

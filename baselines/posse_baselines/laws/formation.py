@@ -18,8 +18,6 @@ The motion of the control point obeys::
 Its velocity in the follower's own axes is the complex number v_j + i d ω_j.
 """
 
-from __future__ import annotations
-
 import math
 
 from posse.numeric import Record, compiled

@@ -5,8 +5,6 @@ turns a vector from a robot's own axes (ahead, to the left) into the common ones
 back. Angles (rad) are measured from the positive x-axis.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

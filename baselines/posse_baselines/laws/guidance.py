@@ -28,8 +28,6 @@ PNGL that holds a slot   its own       ψ - K σ_d, or the heading of the slot's
 one that does not obey the law yet is turned by the shorter turn, at the limit. Then ω = K dσ/dt + dc/dt: (6), (12).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

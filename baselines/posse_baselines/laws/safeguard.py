@@ -5,8 +5,6 @@ is evaluated by simulating how the robot tracks it within its limits: the time s
 when it would touch, and how far it ends from where the wanted velocity leads.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -4,8 +4,6 @@ A slot is an arm (m) from a leader or the target, in a frame that turns with it:
 heading. In a turning frame each slot moves on its own circle.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final, NamedTuple
 

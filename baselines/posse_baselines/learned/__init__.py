@@ -1,7 +1,5 @@
 """Learned policies: neural networks stored as plain numbers, played without torch."""
 
-from __future__ import annotations
-
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network
 from posse_baselines.learned.policy import LearnedPolicy

@@ -8,8 +8,6 @@ All vectors are relative to the tracker: x ahead, y to the left (:mod:`posse_bas
 scaled to d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final, NamedTuple
 

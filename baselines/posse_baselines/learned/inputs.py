@@ -5,8 +5,6 @@ A network has inputs of a fixed meaning, while an observation depends on team si
 missing ones are filled with the field's value for "unknown". An :class:`Encoder` applies it to a layout.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -55,7 +53,7 @@ class Encoding:
             raise PolicyError(f"unknown encoding {self.kind!r:.80}; encodings are: {', '.join(KINDS)}")
 
     @classmethod
-    def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
+    def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> "Encoding":
         """Return the encoding that reads every field of a layout, of all team-mates or of the nearest so many."""
         fields = tuple(
             EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour) for f in layout.fields

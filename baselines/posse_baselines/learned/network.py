@@ -1,7 +1,5 @@
 """A network as plain arrays, and its forward pass."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -71,7 +69,7 @@ class Network(OwnArrays):
             named[f"layers.{k}.bias"] = bias
         return {name: np.ascontiguousarray(array) for name, array in named.items()}
 
-    def layers(self) -> Layers:
+    def layers(self) -> "Layers":
         """Return the network as :func:`forward` reads it."""
         weights, biases = [], []
         for weight, bias in zip(self.weights, self.biases, strict=True):

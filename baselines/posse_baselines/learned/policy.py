@@ -3,8 +3,6 @@
 A policy file is one safetensors file of tensors and JSON, protected by a digest. Reading one never runs code.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping
@@ -112,7 +110,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             raise PolicyError(f"trained_splits={splits!r:.80} on its card must be a list of {', '.join(SPLITS)}")
         self.name, self.side, self.trained_splits, self.card = name, side, tuple(splits), dict(card)
 
-    def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
+    def with_card(self, card: Mapping[str, Any]) -> "LearnedPolicy":
         """Return the same policy with another card."""
         return LearnedPolicy(self.network, self.encoding, card, self.adviser, self.safeguard)
 
@@ -167,7 +165,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         write_policy_file(path, self.network.tensors(), self.description())
 
     @classmethod
-    def from_file(cls, path: str | Path) -> LearnedPolicy:
+    def from_file(cls, path: str | Path) -> "LearnedPolicy":
         """Return the policy of a file; PolicyError if there is none, or it is damaged or of another kind."""
         path = Path(path)
         tensors, text = _read(path)

@@ -5,8 +5,6 @@ then, and the world is stepped from there to the present with the actions that w
 corrects the present by what the engine makes of it, and is not rolled forward on a line.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, Final, NamedTuple

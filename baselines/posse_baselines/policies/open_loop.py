@@ -4,8 +4,6 @@ A target that learns must cost a team more than the most harmful of these, else 
 policy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The planner: a reference that reads the state and plays ahead in copies of the worlds."""
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ It reads the state of the worlds: poses, the slot frame, obstacles. What it leav
 :data:`WAY`. :func:`drive` plays it in any batch of worlds.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The scripted policies, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Final

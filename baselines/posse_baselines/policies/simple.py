@@ -1,7 +1,5 @@
 """Lower bounds for comparisons: policies that stand still, act at random, or go straight at the target."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

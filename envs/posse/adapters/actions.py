@@ -4,8 +4,6 @@ An action is (speed, turn rate), each in [-1, 1], followed by the message. The `
 has three speeds by five turn rates.
 """
 
-from __future__ import annotations
-
 import itertools
 import reprlib
 from typing import Any, Final

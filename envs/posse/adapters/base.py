@@ -1,7 +1,5 @@
 """What all environments share: a batch, its seeds, and drawing; and what those of one world share."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar

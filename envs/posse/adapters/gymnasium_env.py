@@ -1,7 +1,5 @@
 """Gymnasium environments: one agent controls the team, or a single tracker."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

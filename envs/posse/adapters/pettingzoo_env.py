@@ -1,7 +1,5 @@
 """PettingZoo environments: trackers, and optionally the target, are agents."""
 
-from __future__ import annotations
-
 import reprlib
 from collections.abc import Mapping
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """One real robot in the place of a tracker: its measurements become an observation, an action its command."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterable

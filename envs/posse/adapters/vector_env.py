@@ -1,7 +1,5 @@
 """Gymnasium vector environments: many worlds, stepped by one call."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Checks of the arguments of a batch, before anything is changed."""
 
-from __future__ import annotations
-
 import reprlib
 from collections.abc import Callable, Mapping
 from typing import Any, Final

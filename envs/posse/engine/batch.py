@@ -3,8 +3,6 @@
 The environments, training and evaluation are built on :class:`Batch`.
 """
 
-from __future__ import annotations
-
 import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -185,7 +183,7 @@ class Batch(OwnArrays):
         self.check_started("observe")
         return self._execute(np.zeros(self.num_worlds, np.bool_), LOOK)
 
-    def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
+    def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: "Batch | None" = None) -> "Batch":
         """Return ``count`` copies of the current state of every world, for planning ahead.
 
         Copy j of world e is world ``e * count + j`` of the returned batch. A copy has the present

@@ -7,8 +7,6 @@ Only the kernels at the end loop over a batch; the other functions process one w
 are observed together.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple

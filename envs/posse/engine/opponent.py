@@ -1,7 +1,5 @@
 """A batch in which a policy moves some robots: the target, the trackers, or all trackers but one."""
 
-from __future__ import annotations
-
 import reprlib
 from typing import Any, Protocol, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Array types and constants shared by kernels and their callers."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

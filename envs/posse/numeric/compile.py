@@ -5,8 +5,6 @@ fast-math, since a result must not depend on a world's place in its batch. With 
 plain function, for debugging.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import hashlib

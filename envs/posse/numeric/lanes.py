@@ -11,8 +11,6 @@ numbers, so that a formula is written only once. The body of a function works on
 nothing is compiled; the decorators above it say what it compiles to.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any, Final, TypeVar

@@ -1,7 +1,5 @@
 """Calls of a kernel in several threads, which share the worlds."""
 
-from __future__ import annotations
-
 import concurrent.futures as futures
 import contextlib
 import functools

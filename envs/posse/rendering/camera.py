@@ -4,8 +4,6 @@ The view contains all working robots, changes its scale rarely, and moves smooth
 time, so that it depends only on the states drawn. In an arena it stays on the arena.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -1,7 +1,5 @@
 """An anti-aliased surface, and the window that shows it: the only module that uses pygame."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

@@ -1,7 +1,5 @@
 """The layers of a frame and its text: one function each."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

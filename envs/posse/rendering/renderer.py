@@ -4,8 +4,6 @@ The style follows the paper's figures: trackers are grey discs with a line for t
 target has its own colour. :mod:`posse.rendering.layers` lists the layers of a frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Final
 

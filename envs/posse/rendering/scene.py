@@ -1,7 +1,5 @@
 """The contents of a frame, read from a batch, and their recent past; drawing reads no records."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

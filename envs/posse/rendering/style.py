@@ -4,8 +4,6 @@ The hues are Okabe and Ito's, which colour-blind people tell apart. The target, 
 the team grey or blue. A *point* is a pixel in a frame whose shorter side is :data:`DESIGN_SIZE`.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 Colour = tuple[int, int, int]

@@ -5,8 +5,6 @@ before contact with another disc or a wall; a blocked robot stays in place until
 free. A contact is counted once, when it begins, and by kind.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -4,8 +4,6 @@ Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch
 and sonar read these rows in blocks of eight (:mod:`posse.numeric.lanes`); the padding of the last block is far away.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Faults: trackers break permanently; sensors and radios fail temporarily."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -5,8 +5,6 @@ step needs no trigonometric function: the turn in one step is at most 1 rad (che
 scenario), for which a short polynomial is exact to float32 rounding.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -4,8 +4,6 @@ Robots with nothing near move independently. The others move in physics steps, t
 with swept collision checks.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

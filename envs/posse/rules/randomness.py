@@ -5,8 +5,6 @@ the number of threads, and a world of a batch replays alone bit for bit. The mix
 finalizer of SplitMix64 (Steele, Lea & Flood 2014), applied once per coordinate.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -5,8 +5,6 @@ a working tracker that touches nothing is within tolerance of it; any tracker ma
 For the safe score, steps count only until the first contact of any tracker.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from posse.numeric import ONE, ZERO, Record, Records, compiled

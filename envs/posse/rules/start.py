@@ -4,8 +4,6 @@ Places are drawn until one is clear. What finds none in so many tries is noted i
 (``undrawn``), and :func:`check_drawn` raises.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Families: scenarios that differ in some settings, each drawn from its range."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
@@ -85,7 +83,7 @@ class Family:
             values[name] = low + int(share * (high - low + 1)) if steps else low + share * (high - low)
         return self.base.replace(**values)
 
-    def replace(self, **changes: Any) -> Family:
+    def replace(self, **changes: Any) -> "Family":
         """Return a family with settings changed: each gets a range or one value, as in :func:`posse.family`."""
         return family(self, **changes)
 

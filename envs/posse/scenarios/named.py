@@ -1,7 +1,5 @@
 """The named scenarios of the benchmark: what each sets differently from the defaults."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from posse.declarations import unknown

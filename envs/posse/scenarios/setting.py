@@ -1,7 +1,5 @@
 """A setting of a scenario, written once: unit, range and meaning on the field, its kind by the annotation."""
 
-from __future__ import annotations
-
 import math
 import reprlib
 from collections.abc import Iterable

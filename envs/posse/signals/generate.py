@@ -4,8 +4,6 @@ numba cannot loop over a tuple of functions, since each function has a type of i
 written out, with one line for each declared function that they call. :func:`posse.kernel_source` returns the text.
 """
 
-from __future__ import annotations
-
 import functools
 import linecache
 from collections.abc import Iterable, Iterator, Mapping

@@ -10,8 +10,6 @@ the radio's last received and pending messages. Derived values (sonar, contacts,
 the sums of metrics are not included.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 To add one, declare it here, or in a module of your own (:func:`posse.metric`).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

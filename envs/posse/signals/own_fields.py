@@ -6,8 +6,6 @@ now if the radio is perfect, else as in the last message received. To add a fiel
 or in a module of your own (:func:`posse.field`).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

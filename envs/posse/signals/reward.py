@@ -4,8 +4,6 @@ To add one, declare it here, or in a module of your own (:func:`posse.reward_ter
 and reported in every scenario, others in scenarios that give them a weight.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

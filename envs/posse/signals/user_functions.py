@@ -1,7 +1,5 @@
 """Errors in functions that users' modules declare, reported by function and line."""
 
-from __future__ import annotations
-
 import re
 from typing import Any, Final
 

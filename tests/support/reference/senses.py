@@ -1,7 +1,5 @@
 """Sight, fixes, sonar and radio."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -51,7 +49,7 @@ class Fix:
     frame: complex = 1.0
     velocity: complex = 0.0
 
-    def newer(self, s: posse.Scenario, other: Fix) -> Fix:
+    def newer(self, s: posse.Scenario, other: "Fix") -> "Fix":
         """Return the other fix with the velocity between the two."""
         steps, velocity = other.step - self.step, 0j
         if self.step >= 0 and steps * s.control_step <= 1.0 + 1e-6:

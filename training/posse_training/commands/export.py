@@ -1,7 +1,5 @@
 """``posse export``: the network of a learned policy as ONNX, for robots without Python; needs the extra ``export``."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass

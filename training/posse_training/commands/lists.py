@@ -1,7 +1,5 @@
 """``posse scenarios`` and ``posse policies``: what there is, by name, in tables that fit 80 columns."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,7 +1,5 @@
 """``posse replay``: teams on the same world, as one HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

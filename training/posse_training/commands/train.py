@@ -1,7 +1,5 @@
 """``posse train``: train a team, once or with several seeds."""
 
-from __future__ import annotations
-
 import contextlib
 import platform
 import shlex

@@ -4,8 +4,6 @@ Policies of the package and policy files play in this process. Code, ``package.m
 plays in a process of its own, which is ended at the time limit. That is no sandbox.
 """
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import json
@@ -93,7 +91,7 @@ class Settings:
     """Settings to change in each scenario, such as num_trackers=3 or arena=6,4, which is a range of a family."""
 
 
-def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
+def compare(settings: Settings, *, console: Console | None = None) -> "Comparison":
     """Evaluate all policies; write rows, summary, figures and report.
 
     A policy that is incompatible with a scenario is omitted there; one that fails is listed under ``failed``. The

@@ -1,7 +1,5 @@
 """Contenders of a comparison: one policy, or one policy for each of several training seeds."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -102,7 +100,7 @@ class Plays:
         """Return a metric, (S, W): training seeds by worlds."""
         return np.stack([result[metric] for result in self.results])
 
-    def paired(self, other: Plays) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def paired(self, other: "Plays") -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """Return the safe scores of both, (S, W) each, in the worlds that both played."""
         mine, theirs = self["safe_score"], other["safe_score"]
         both = min(mine.shape[1], theirs.shape[1])

@@ -1,7 +1,5 @@
 """The figures of ``posse compare``; each states worlds, split, seed and the scenario's version."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """The report of a comparison: one page with all estimates and figures, and links to replays beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources

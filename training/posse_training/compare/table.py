@@ -1,7 +1,5 @@
 """The estimates of a comparison, and their table."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

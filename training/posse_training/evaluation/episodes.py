@@ -1,7 +1,5 @@
 """One episode in every world of a batch, measured."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 Every policy plays the same worlds: world i depends on the seed, the split and i only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

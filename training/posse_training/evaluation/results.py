@@ -1,7 +1,5 @@
 """The results of an evaluation: one row for each episode."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -7,8 +7,6 @@ of them does; of a scenario each world alone. Blocks of a family are few, and pe
 standard deviation. One block alone has no interval: both ends are its value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final

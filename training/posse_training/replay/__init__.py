@@ -1,7 +1,5 @@
 """Replays: one or more teams on the same world, as one HTML file."""
 
-from __future__ import annotations
-
 from posse_training.replay.episode import Event, Player, Replay, join
 from posse_training.replay.page import read_replay, write_replay
 from posse_training.replay.recording import RECORD, record, replay_of

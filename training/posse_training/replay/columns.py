@@ -29,8 +29,6 @@ observation/NAME           (rows, ...)       each field; without ``observations`
 Rows are the trackers, followed by the target if it is an agent.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from typing import Any, Final

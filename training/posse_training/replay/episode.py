@@ -4,8 +4,6 @@ A *frame* is the world at a control step: frame 0 is the start, frame T the end.
 and beliefs in row t are those of frame t; a reward term in row t is that of the step before it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final

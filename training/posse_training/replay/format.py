@@ -7,8 +7,6 @@ plane series by series: small numbers leave long runs of zeros, which deflate we
 each player, T + 1, and of each column its ``name``, the ``shape`` of a row and its resolution, ``scale``.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import zlib

@@ -4,8 +4,6 @@ The code consists of the modules in ``web/``, concatenated to one module, since 
 other files. Data are deflated. External text (names, cards, settings) is written as data, never as markup or code.
 """
 
-from __future__ import annotations
-
 import base64
 import itertools
 import re

@@ -1,7 +1,5 @@
 """Plays a world with each policy, and makes a replay of the trajectories: columns, events, and a description."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

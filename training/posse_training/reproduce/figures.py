@@ -1,7 +1,5 @@
 """Figures 7 to 10 of the paper, and of what it announces but does not show: several K and c, a leader's loss."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final

@@ -3,8 +3,6 @@
 The paper does not state scale, gains and starts; docs/paper.md lists those chosen here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

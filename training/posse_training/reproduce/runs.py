@@ -1,7 +1,5 @@
 """Runs of the paper's section 4: starts as in figure 7, what figures read from a trajectory, and settling times."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, Final

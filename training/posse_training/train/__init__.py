@@ -1,7 +1,5 @@
 """Training runs: settings, training, checkpoints."""
 
-from __future__ import annotations
-
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import TrainSettings, read_settings
 

@@ -4,8 +4,6 @@ A checkpoint is one file of tensors and plain values; reading one runs no code (
 new one replaces the last one atomically, so that a whole one exists whenever the process is killed.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What a training run shows: a bar on a terminal, a line for each evaluation, and logs."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import time

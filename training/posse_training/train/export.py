@@ -1,7 +1,5 @@
 """From a torch model to a policy that plays without torch, and its card."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -6,8 +6,6 @@ that *it* visits. At the end the value function is fitted to the copy's returns;
 the copy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The layers of a model: input normalisation, and the actor and critic of mappo."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The default settings of a training, by preset, scenario and algorithm: ``defaults.toml`` beside this file."""
 
-from __future__ import annotations
-
 import tomllib
 from importlib import resources
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """The settings of a training run: one typed, frozen class; :mod:`posse_training.train.presets` has its defaults."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """``posse train``: from settings to a trained policy, in the order it runs."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import time

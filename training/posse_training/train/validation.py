@@ -1,7 +1,5 @@
 """What a run is judged and normalised by: validation scores and first input statistics."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Final
 

@@ -4,8 +4,6 @@ All trackers share one policy, so that E worlds of N trackers are E x N environm
 single-agent learner. Slot ``e * N + i`` is tracker i of world e.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import chain
 from typing import Any, Final

@@ -4,8 +4,6 @@ All vectors are in the target's slot frame (ahead, left), so that the state does
 position in the plane. The tracker whose value is estimated comes first, the others by number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The worlds of a training run: what learns in them, and what it plays against."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Each working tracker broadcasts its pose, speed, turn rate, its best fix of the 
 fix's time, and the policy's message. Range, delay and loss apply to the whole broadcast.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from posse.numeric import ZERO, FloatArray, Record, Records, compiled

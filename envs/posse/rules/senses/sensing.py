@@ -1,7 +1,5 @@
 """The built-in target sensor, and fixes of the target."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The sonar ring: distance to the nearest disc or wall in each direction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from posse.numeric import ONE, TINY, WIDTH, ZERO, FloatArray, Record, Records, compiled

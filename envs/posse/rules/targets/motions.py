@@ -1,7 +1,5 @@
 """The motions that need no knowledge of the team: constant, accelerating, and the target moved by a policy."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

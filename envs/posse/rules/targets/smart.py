@@ -4,8 +4,6 @@ The target escapes through the widest gap until the team keeps station or a trac
 Then it darts: it takes the turn that disrupts the formation most, and holds it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

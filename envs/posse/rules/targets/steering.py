@@ -6,8 +6,6 @@ block the target, which then turns on the spot, both circles may be occupied: th
 wider side until one is free, and contacts stop it (:mod:`posse.rules.contact`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 
