@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from tests.support.process import examples, printed, run
+from tests.support.pages import blocks
+from tests.support.process import printed, run
 
 import posse
 
@@ -152,7 +153,7 @@ def test_the_generated_source_can_be_read() -> None:
 # --- examples of the manual -----------------------------------------------------------------------
 
 
-EXAMPLES = examples("extend.md")
+EXAMPLES = {Path(title).stem: text for _, title, text in blocks("docs/extend.md") if title is not None}
 
 
 def test_another_process_and_a_command_import_a_users_module(tmp_path: Path) -> None:

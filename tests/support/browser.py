@@ -40,15 +40,9 @@ def chromium() -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(
-    browser: Browser, path: Path, address: str = "", *, size: tuple[int, int] = (1200, 800), still: bool = False
-) -> Iterator[Page]:
-    """Open a file; fail if it makes a request or writes to the console. ``still``: the user wants no motion."""
-    context = browser.new_context(
-        viewport={"width": size[0], "height": size[1]},
-        reduced_motion="reduce" if still else "no-preference",
-        device_scale_factor=1,
-    )
+def opened(browser: Browser, path: Path, address: str = "", *, size: tuple[int, int] = (1200, 800)) -> Iterator[Page]:
+    """Open a file; fail if it makes a request or writes to the console."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, device_scale_factor=1)
     heard: list[str] = []
     page = context.new_page()
     page.on("console", lambda message: heard.append(message.text))

@@ -1,7 +1,6 @@
 """Python in a process of its own, which imports all packages from this tree; users' modules, run there."""
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -45,12 +44,6 @@ def run_tests_elsewhere(file: str | Path, folder: Path, **settings: Any) -> str:
     """Run a file of tests there."""
     words = f"-m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {folder / 'cases'} {file}"
     return elsewhere(*words.split(), **settings)
-
-
-def examples(chapter: str) -> dict[str, str]:
-    """Return the modules of a chapter of the manual by name."""
-    text = (ROOT / "docs" / chapter).read_text(encoding="utf-8")
-    return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
 
 
 def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
