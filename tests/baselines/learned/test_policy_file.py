@@ -98,28 +98,34 @@ def test_a_damaged_file_is_refused_or_plays_the_same(whole: bytes, where: float,
     assert kept == 1 or read(whole[: int(kept * len(whole))]) is None
 
 
+LAST = TENSORS["layers.2.weight"]
 LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, False]]}
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "arrays", "message"),
     [
-        ({"format": 2}, "its format is 2, this version reads 1"),
-        ({"adviser": "os:system"}, "unknown adviser 'os:system'"),
-        ({"adviser": "planner"}, "cannot be an adviser"),
-        ({"adviser": "ddcs-distributed"}, "the network takes"),
-        ({"encoding": {**LONG, "kind": "fancy"}}, "encodings are: plain"),
-        ({"encoding": LONG}, "takes"),
-        ({"card": "name"}, "is damaged"),
-        ({"card": {"side": "both"}}, "side='both'"),
-        ({"card": {"trained_splits": ["trian"]}}, "trained_splits="),
+        ({"format": 2}, {}, "its format is 2, this version reads 1"),
+        ({"adviser": "os:system"}, {}, "unknown adviser 'os:system'"),
+        ({"adviser": "planner"}, {}, "cannot be an adviser"),
+        ({"adviser": "ddcs-distributed"}, {}, "the network takes"),
+        ({"encoding": {**LONG, "kind": "fancy"}}, {}, "encodings are: plain"),
+        ({"encoding": LONG}, {}, "takes"),
+        ({"card": "name"}, {}, "is damaged"),
+        ({"card": {"side": "both"}}, {}, "side='both'"),
+        ({"card": {"trained_splits": ["trian"]}}, {}, "trained_splits="),
+        ({}, {"normaliser.mean": np.zeros((3, 3), np.float32)}, "normaliser.mean has shape"),
+        ({}, {"layers.0.weight": TENSORS["layers.0.weight"].astype(np.float64)}, "finite float32"),
+        ({}, {"layers.2.bias": np.full_like(TENSORS["layers.2.bias"], np.nan)}, "finite float32"),
+        ({}, {"layers.2.weight": LAST[:1]}, r"layers.2.weight has shape \(1, 16\), not \(2, 16\)"),
+        ({}, {"layers.7.weight": LAST}, "is damaged"),
     ],
 )
-def test_descriptions_that_make_no_policy(
-    tmp_path: Path, described: dict[str, Any], changes: dict[str, Any], message: str
+def test_descriptions_and_arrays_that_make_no_policy(
+    tmp_path: Path, described: dict[str, Any], changes: dict[str, Any], arrays: dict[str, Any], message: str
 ) -> None:
     path = tmp_path / "forged.safetensors"
-    write_policy_file(path, TENSORS, {**described, **changes})
+    write_policy_file(path, {**TENSORS, **arrays}, {**described, **changes})
     with pytest.raises(PolicyError, match=message) as caught:
         LearnedPolicy.from_file(path)
     assert str(path) in str(caught.value)
@@ -133,22 +139,3 @@ def test_descriptions_that_lack_something_or_are_of_another_kind(tmp_path: Path,
         write_policy_file(path, TENSORS, description)
         with pytest.raises(PolicyError, match="damaged"):
             LearnedPolicy.from_file(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "array", "message"),
-    [
-        ("normaliser.mean", np.zeros((3, 3), np.float32), "normaliser.mean has shape"),
-        ("layers.0.weight", TENSORS["layers.0.weight"].astype(np.float64), "finite float32"),
-        ("layers.2.bias", np.full_like(TENSORS["layers.2.bias"], np.nan), "finite float32"),
-        ("layers.2.weight", TENSORS["layers.2.weight"][:1], r"layers.2.weight has shape \(1, 16\), not \(2, 16\)"),
-        ("layers.7.weight", TENSORS["layers.2.weight"], ""),
-    ],
-)
-def test_arrays_that_make_no_network(
-    tmp_path: Path, described: dict[str, Any], name: str, array: Any, message: str
-) -> None:
-    path = tmp_path / "forged.safetensors"
-    write_policy_file(path, {**TENSORS, name: array}, described)
-    with pytest.raises(PolicyError, match=rf"forged\.safetensors.*{message}"):
-        LearnedPolicy.from_file(path)
