@@ -148,19 +148,23 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_evaluation_names_the_target_and_is_the_same_alone(file: Path, tmp_path: Path) -> None:
-    many, few = (evaluate("ddcs-distributed", SHORT, count, target=str(file), progress=False) for count in (5, 2))
+def test_an_evaluation_is_the_same_alone_and_its_files_name_target_and_settings(file: Path, tmp_path: Path) -> None:
+    many, few = (evaluate("ddcs-distributed", SHORT, count, 9, target=str(file), progress=False) for count in (5, 2))
+    assert list(many) == list(few.columns)
     for name, column in few.columns.items():
         np.testing.assert_array_equal(column, many[name][:2], name)
-    scripted = evaluate("ddcs-distributed", SHORT, 5, progress=False)
+    scripted = evaluate("ddcs-distributed", SHORT, 5, 9, progress=False)
     assert not np.array_equal(many["tracking_error"], scripted["tracking_error"])
     assert many.target == "evading"
     assert scripted.target is None
     assert many.scenario.to_dict()["target_motion"] == "agent"
-    many.write(tmp_path / "rows.csv")
-    rows = csv.DictReader((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines())
-    assert {row["target"] for row in rows} == {"evading"}
-    assert json.loads((tmp_path / "rows.json").read_text())["target"] == "evading"
+    many.write(tmp_path / "deep" / "rows.csv")
+    rows = [*csv.DictReader((tmp_path / "deep" / "rows.csv").read_text(encoding="utf-8").splitlines())]
+    assert [(row["world"], row["target"]) for row in rows] == [(str(world), "evading") for world in range(5)]
+    assert [float(row["score"]) for row in rows] == list(many["score"])
+    settings = json.loads((tmp_path / "deep" / "rows.json").read_text())
+    assert (settings["target"], settings["seed"], settings["split"]) == ("evading", 9, "test")
+    assert settings["scenario"]["horizon"] == 30
 
 
 def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: Path) -> None:

@@ -1,8 +1,5 @@
 """Evaluations of a policy on many worlds, and the intervals of their means."""
 
-import csv
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +7,7 @@ import pytest
 from scipy import stats
 
 import posse
-from posse_baselines import from_function, load, play
+from posse_baselines import from_function
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
 from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds
@@ -18,31 +15,11 @@ from posse_training.evaluation.statistics import difference, improvement, mean, 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
 
-def test_it_plays_the_worlds_of_a_batch() -> None:
-    scenario = posse.get_scenario("constant", horizon=80)
-    results = evaluate("pursuit", scenario, 4, seed=3, progress=False)
-    played = play(posse.Batch(scenario, 4, seed=3, split="test"), load("pursuit"))
-    assert list(results) == list(results.columns)
-    for name, column in played.items():
-        np.testing.assert_array_equal(results[name], column)
-
-
 def test_a_split_that_a_policy_was_trained_on_is_refused() -> None:
     policy: Any = from_function(np.zeros_like, name="trained")
     policy.trained_splits = ("train", "validation")
     with pytest.raises(ValueError, match="'trained' was trained on the split 'validation'"):
         evaluate(policy, "constant", 1, split="validation", **FAST)
-
-
-def test_rows_and_settings_are_written_as_files(tmp_path: Path) -> None:
-    results = evaluate("idle", "radio", 3, seed=9, **FAST)
-    results.write(tmp_path / "deep" / "idle.csv")
-    rows = list(csv.DictReader((tmp_path / "deep" / "idle.csv").read_text().splitlines()))
-    assert [int(row["world"]) for row in rows] == [0, 1, 2]
-    assert [float(row["score"]) for row in rows] == list(results["score"])
-    settings = json.loads((tmp_path / "deep" / "idle.json").read_text())
-    assert settings["scenario"]["radio_loss"] == posse.get_scenario("radio").radio_loss
-    assert (settings["seed"], settings["split"]) == (9, "test")
 
 
 @pytest.mark.parametrize("reads", [False, True])
