@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
 from gymnasium.wrappers import FlattenObservation
-from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, seed_test
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, render_test, seed_test
 from stable_baselines3.common.env_checker import check_env as sb3_check
 from torchrl.envs import GymEnv, PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
@@ -76,6 +76,10 @@ def test_environments_of_many_agents_conform(check: Callable[[Settings], None], 
     check(VARIANTS[variant])
 
 
+def test_an_environment_in_turns_can_draw() -> None:
+    render_test(posse.env)
+
+
 @pytest.mark.parametrize("variant", [name for name in VARIANTS if "target_motion" not in VARIANTS[name]])
 @pytest.mark.parametrize("name", ["Team", "Solo", "Tracker"])
 def test_environments_of_one_agent_conform(name: str, variant: str) -> None:
@@ -85,7 +89,7 @@ def test_environments_of_one_agent_conform(name: str, variant: str) -> None:
     elif name == "Tracker" and variant == "one tracker":
         settings["num_trackers"] = 2
     env = gymnasium.make(f"posse/{name}-v0", **settings)
-    gymnasium_check(env.unwrapped, skip_render_check=True)
+    gymnasium_check(env.unwrapped, skip_render_check=variant != "smart")
     sb3_check(FlattenObservation(env) if name == "Team" else env.unwrapped)  # networks of SB3 take vectors
     check_env_specs(GymEnv(f"posse/{name}-v0", **settings))
     types, ended = types_of(env.reset(seed=1)[1]), False

@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
-from tests.support.adapters import out_of_band, part, same
+from tests.support.adapters import f32, out_of_band, part, same
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
 
 SEEDS = st.integers(0, 2**63 - 1)
@@ -173,6 +173,21 @@ def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kin
         for subject in (rounded, clipping):
             with pytest.raises(ValueError, match=r"(nan|inf) is not a number in \[-1, 1\]"):
                 step(subject, np.where(bounds > 0, bad, np.float32(0.5)))
+
+
+@pytest.mark.parametrize("kind", ["parallel", "team", "solo"])
+def test_worlds_differ_without_a_seed_and_follow_from_one(kind: str) -> None:
+    starts = [Subject(kind, **seed).env.reset()[0] for seed in ({}, {}, {"seed": 4})]
+    assert not same(starts[0], starts[1])
+    assert same(starts[2], Subject(kind).env.reset(seed=4)[0])
+
+
+@pytest.mark.parametrize("kind", ["team", "solo"])
+def test_contact_terminates_where_it_is_asked_for(kind: str) -> None:
+    subject = Subject(kind, terminate_on_contact=True, num_trackers=1, target_speed=0.0, horizon=40)
+    subject.env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
+    ends = [subject.env.step(subject.action(f32([[[1, 0]]])))[2:4] for _ in range(7)]
+    assert ends == [(False, False)] * 6 + [(True, False)]
 
 
 @pytest.mark.parametrize("kind", ["parallel", "team", "solo"])

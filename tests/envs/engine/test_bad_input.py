@@ -37,6 +37,7 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("batch", {"clip_actions": "False"}, "clip_actions='False' must be True or False"),
         ("batch", {"num_threads": 0}, rf"num_threads=0 {WHOLE} \[1, "),
         ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
+        ("parallel", {"num_worlds": 4}, "num_worlds= is for many worlds"),
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
         ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
