@@ -1,6 +1,5 @@
 """A batch in which a policy moves the target."""
 
-from copy import deepcopy
 from typing import Any
 
 import gymnasium as gym
@@ -70,16 +69,6 @@ def test_it_plays_as_a_batch_whose_other_side_is_driven_from_outside(side: str, 
         if autoreset == "same_step" and truncated.any():
             age[truncated] = 0
             np.testing.assert_array_equal(infos["final_obs"], told["final_obs"][:, own])
-
-
-def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
-    batch = posse.batch(SHORT, WORLDS, target_policy=Weaver())
-    batch.reset()
-    batch.step(actions_for(batch, 0))
-    copy = deepcopy(batch)  # by way of pickling
-    for step in range(1, 5):
-        np.testing.assert_array_equal(copy.step(actions_for(copy, step))[0], batch.step(actions_for(batch, step))[0])
-    np.testing.assert_array_equal(batch.restore(batch.save()), batch.observe())
 
 
 class Wrong(Weaver):
