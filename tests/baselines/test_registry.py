@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.learned import any_policy, target_for
+from tests.support.learned import policy_for, target_for
 
 import posse
 from posse_baselines import PolicyError, batch_for, load, load_target, play, policy_names, target_names
@@ -85,7 +85,7 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
     target_for(SHORT).save(file)
     with pytest.raises(PolicyError, match=r"policy of a target: give it as target="):
         load(file)
-    any_policy().save(team)
+    policy_for(posse.ObservationLayout(SHORT)).save(team)
     with pytest.raises(PolicyError, match="policy of a team, 'mine'"):
         load_target(team)
     evader = load_target(file)

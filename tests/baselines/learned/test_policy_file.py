@@ -11,13 +11,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from safetensors.numpy import save
-from tests.support.learned import any_policy, observations_of
+from tests.support.learned import observations_of, policy_for
 
+import posse
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy import write_policy_file
 
-POLICY = any_policy()
+POLICY = policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
 TENSORS = POLICY.network.tensors()
 RUNS_CODE = ("exec", "compile", "import", "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen")
 _seen: list[str] | None = None

@@ -106,10 +106,6 @@ def test_the_measured_heading_of_the_target_is_noisy_and_with_it_the_slot_frame(
 # --- what is drawn beside the start ---------------------------------------------------------------
 
 
-def broken(batch: posse.Batch) -> np.ndarray:
-    return np.asarray(batch.state["tracker_broken_at"] != NEVER)
-
-
 @pytest.mark.parametrize("number", [1, 4])
 def test_drawn_trackers_break_at_drawn_times(number: int) -> None:
     batch = posse.batch(
@@ -118,9 +114,9 @@ def test_drawn_trackers_break_at_drawn_times(number: int) -> None:
     batch.reset(seed=1)
     for _ in range(100):
         batch.step(np.zeros(batch.action_shape))
-        assert (batch.state["world_working"] == 5 - broken(batch).sum(axis=1)).all()
+        assert (batch.state["world_working"] == batch.working.sum(axis=1)).all()
     at = batch.state["tracker_broken_at"]
-    assert (broken(batch).sum(axis=1) == number).all()
+    assert (batch.working.sum(axis=1) == 5 - number).all()
     times = at[at != NEVER]
     assert times.min() >= 30
     assert times.max() < 70
@@ -134,10 +130,10 @@ def test_the_nearest_to_the_target_break_one_after_the_other_within_the_window()
     batch.reset(seed=3)
     rng = np.random.default_rng(2)
     for _ in range(100):
-        away, was_broken = np.abs(points(batch, "tracker") - points(batch, "world")[:, None]), broken(batch)
+        away, was_broken = np.abs(points(batch, "tracker") - points(batch, "world")[:, None]), ~batch.working
         batch.step(rng.uniform(-1, 1, batch.action_shape))
-        for e in np.flatnonzero((broken(batch) & ~was_broken).any(axis=1)):
-            new = np.flatnonzero(broken(batch)[e] & ~was_broken[e])
+        for e in np.flatnonzero((~batch.working & ~was_broken).any(axis=1)):
+            new = np.flatnonzero(~batch.working[e] & ~was_broken[e])
             assert new.tolist() == [np.where(was_broken[e], np.inf, away[e]).argmin()]
     times = np.sort(batch.state["tracker_broken_at"], axis=1)
     assert (times[:, 3:] == NEVER).all()
@@ -152,4 +148,4 @@ def test_all_break_even_in_the_last_steps() -> None:
     batch.reset(seed=3)
     for _ in range(60):
         batch.step(np.zeros(batch.action_shape))
-    assert (broken(batch).sum(axis=1) == 4).all()
+    assert (batch.working.sum(axis=1) == 1).all()
