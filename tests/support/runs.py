@@ -76,11 +76,6 @@ def steps_saved(folder: Path) -> int:
     return int(read_checkpoint(folder)["model"]["num_timesteps"])
 
 
-def assert_equal(mine: dict[str, Any], theirs: dict[str, Any]) -> None:
-    assert mine.keys() == theirs.keys()
-    assert [name for name, value in mine.items() if value != theirs[name]] == []
-
-
 class Killed(BaseException):
     """Ends a run as a signal does."""
 

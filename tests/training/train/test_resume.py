@@ -9,18 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.runs import (
-    AGAINST,
-    GUARDED,
-    TARGET,
-    assert_equal,
-    killed_at,
-    numbers,
-    quiet,
-    resume,
-    small,
-    steps_saved,
-)
+from numpy.testing import assert_equal
+from tests.support.runs import AGAINST, GUARDED, TARGET, killed_at, numbers, quiet, resume, small, steps_saved
 
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
