@@ -20,10 +20,6 @@ SHORT: dict[str, Any] = {"num_trackers": 2, "horizon": 4, "settle_time": 0.1}
 LONG_NAME = "x" * 5000
 
 
-def _batch(**settings: Any) -> posse.Batch:
-    return posse.batch(**{"scenario": "constant", "num_worlds": 2, **SHORT, **settings})
-
-
 def _single(name: str, **settings: Any) -> Any:
     return gymnasium.make(name, disable_env_checker=True, **{**SHORT, **settings}).unwrapped
 
@@ -39,7 +35,7 @@ def _torchrl() -> Any:
 
 
 MAKERS: dict[str, Callable[..., Any]] = {
-    "batch": _batch,
+    "batch": lambda **settings: posse.batch(**{"num_worlds": 2, **SHORT, **settings}),
     "parallel": lambda **settings: posse.parallel_env(**{**SHORT, **settings}),
     "team": functools.partial(_single, "posse/Team-v0"),
     "solo": functools.partial(_single, "posse/Solo-v0", num_trackers=1),
