@@ -176,7 +176,9 @@ def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy)
         policy.begin(posse.batch("constant", message_size=2).layout, 1)
 
 
-def test_the_script_refuses_a_sensor_of_bearings_alone() -> None:
+def test_the_script_refuses_a_sensor_of_bearings_alone(request: pytest.FixtureRequest) -> None:
+    request.addfinalizer(lambda: posse.SENSORS.pop("by-bearing"))  # commands would tell the user to import this module
+
     @posse.sensor("by-bearing", fix="bearing")
     def by_bearing(c: Any, w: Any, t: Any, dx: Any, dy: Any) -> bool:
         """In sight everywhere."""
