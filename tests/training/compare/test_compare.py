@@ -18,7 +18,7 @@ from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
-from posse_training.errors import RunFolderError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation.statistics import difference
 
 ALONE: dict[str, Any] = {"figures": False, "planner_episodes": 0}
@@ -176,6 +176,15 @@ def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: 
     assert len(found.plays) == 2, "also in the process of a policy that is code"
     assert "planner" in found.left_out[0]["policy"]
     assert json.loads((tmp_path / "out" / SUMMARY).read_text())["target"] == str(file)
+
+
+def test_a_target_that_dies_while_it_is_imported_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "dying_target.py").write_text("import os\n\nos._exit(3)\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    settings = Settings(("pursuit",), ("smart",), 2, out=tmp_path / "out", target="dying_target:Own", **ALONE)
+    with pytest.raises(SettingsError, match=r"target='dying_target:Own' cannot be loaded: .* ended with exit code 3"):
+        compare(settings)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_film_shows_the_target(file: Path, tmp_path: Path) -> None:

@@ -22,9 +22,10 @@ from posse import Batch, Family, Scenario, scenario_names
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, load_target
 from posse_baselines.fields import number
+from posse_baselines.registry import is_code
 from posse_training.compare.contenders import PLANNER, Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
-from posse_training.errors import SettingsError, TimeLimitError, check_settings, require
+from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import (
     FAILURES,
@@ -105,6 +106,11 @@ def compare(settings: Settings, *, console: Console | None = None) -> "Compariso
         if not isinstance(policy, str):
             refuse_trained_split(policy, settings.split)
     if settings.target is not None:
+        if is_code(settings.target):
+            try:
+                check_code(settings.target, load_target)
+            except PlayError as error:
+                raise SettingsError(f"target={settings.target!r:.120} cannot be loaded: {error}") from error
         refuse_trained_split(load_target(settings.target), settings.split)
     folder = _free(settings.out)
     if settings.ray is not False:

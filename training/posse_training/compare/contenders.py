@@ -1,7 +1,7 @@
 """Contenders of a comparison: one policy, or one policy for each of several training seeds."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -69,19 +69,19 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     return tuple(found)
 
 
-def check_code(name: str) -> None:
-    """Load ``package.module:Class`` in a process of its own.
+def check_code(name: str, read: Callable[[str], object] = load) -> None:
+    """Load ``package.module:Class``, a policy or a target, in a process of its own.
 
     Raises:
-        PolicyError: It is no policy.
+        PolicyError: It is none.
         PlayError: It took longer than :data:`LOADING`, or the process died.
     """
-    apart(LOADING, _load, name)
+    apart(LOADING, _load, name, read)
 
 
-def _load(name: str) -> None:
+def _load(name: str, read: Callable[[str], object]) -> None:
     with played_errors():
-        load(name)
+        read(name)
 
 
 @dataclass(frozen=True)
