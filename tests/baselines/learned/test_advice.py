@@ -5,7 +5,7 @@ import pytest
 from tests.support.learned import network_for
 
 import posse
-from posse_baselines import DDCS, play
+from posse_baselines import DDCS, PolicyError, play
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.learned import Encoding, LearnedPolicy
 
@@ -22,6 +22,12 @@ def listener(answer: tuple[float, float], kind: str = "features", safeguard: boo
 
 def worlds(count: int = 6) -> posse.Batch:
     return posse.batch("field", count, message_size=SCRIPT.message_size, horizon=80)
+
+
+def test_an_adviser_that_its_name_does_not_make_again_is_refused() -> None:
+    mine = listener((0.0, 0.0))
+    with pytest.raises(PolicyError, match=r"'ddcs-distributed' cannot be an adviser: .* by its name"):
+        LearnedPolicy(mine.network, mine.encoding, {}, SCRIPT.with_settings(gain=2.0))
 
 
 @pytest.mark.parametrize(("kind", "safeguard"), [("plain", False), ("features", True)])
