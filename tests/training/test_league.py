@@ -13,7 +13,7 @@ from tests.support.runs import HORIZON, killed_at, quiet
 from posse_baselines.registry import shipped
 from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.league import LeagueSettings, draw_matrix, play_league, shares
+from posse_training.league import League, LeagueSettings, draw_matrix, play_league, shares
 from posse_training.train.train import Run
 
 
@@ -76,7 +76,10 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     assert more.cells["idle", "smart"]["score"].count == 2, "what is no training may be changed"
     with pytest.raises(SettingsError, match="unknown setting 'foo'"):
         play_league(tiny(tmp_path / "new", training={"foo": 1}), console=quiet())
+    with pytest.raises(SettingsError, match="num_worlds=1 leaves 0 for a share"):
+        play_league(tiny(tmp_path / "new", scenario="search", targets=("smart", "slow"), training={"num_worlds": 1}))
     assert not (tmp_path / "new").exists()
+    assert League(tiny(tmp_path, scenario="search"), quiet()).training("trackers", tmp_path, "smart").algorithm == "ppo"
     held = json.loads((tmp_path / "league.json").read_text())
     (tmp_path / "league.json").write_text(json.dumps({**held, "scenario_version": 0}))
     shutil.copy(shipped()["learned-radio"], team)

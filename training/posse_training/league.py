@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal
 import tyro
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from posse import get_scenario
 from posse_baselines.fields import number
@@ -55,7 +56,7 @@ class LeagueSettings:
     teams: Annotated[tuple[str, ...], tyro.conf.arg(name="team")] = ("ddcs-tuned",)
     """Teams at the beginning: names or files."""
     targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
-    """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
+    """Targets at the beginning: names or files. Default: smart, constant, and those that read nothing."""
     target_steps: int = number(2_000_000, "", 1, 10**12)
     """Steps of each target's training."""
     team_steps: int = number(6_000_000, "", 1, 10**12)
@@ -212,8 +213,9 @@ class League:
         """Return the settings of a side's training in a folder, against opponents separated by commas."""
         s = self.settings
         steps = longer * (s.target_steps if side == TARGET else s.team_steps)
+        algorithm = s.training.get("algorithm", "ppo")  # the default of some scenarios, cmaes, goes on from no member
         values = {
-            **default_settings(s.scenario, side=side).to_dict(),
+            **default_settings(s.scenario, algorithm, side=side).to_dict(),
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,
@@ -254,11 +256,14 @@ class League:
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
     """Train the generations that are missing, play all against all, train best responses."""
-    from posse_training.train.worlds import pairings  # torch
+    from posse_training.train.algorithms import check_algorithm  # these import torch
+    from posse_training.train.worlds import divided
 
     found = League(settings, console or Console())
     for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
-        pairings(found.training(side, settings.path, ",".join(others)))
+        first = found.training(side, settings.path, ",".join(others))
+        check_algorithm(first)
+        divided(first)
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))
@@ -314,8 +319,8 @@ def draw_matrix(found: League) -> list[Path]:
     with mpl.rc_context({**RC, "axes.grid": False}):
         figure, axis = subplots(1, 1, (WIDTH, 1.4 + 0.42 * len(teams)))
         image = axis.imshow([[v.value for v in row] for row in scores], vmin=0, vmax=1, cmap="cividis", aspect="auto")
-        axis.set_xticks(range(len(targets)), targets, rotation=35, ha="right")
-        axis.set_yticks(range(len(teams)), teams)
+        axis.set_xticks(range(len(targets)), [plain(t) for t in targets], rotation=35, ha="right")
+        axis.set_yticks(range(len(teams)), [plain(t) for t in teams])
         axis.set(xlabel="target", ylabel="team")
         for i, row in enumerate(scores):
             for j, score in enumerate(row):
@@ -336,16 +341,17 @@ def tables(found: League) -> list[Table]:
         part = found.targets[first : first + _COLUMNS]
         matrix = Table("team", title="score of the team (row) against the target (column), 95 % intervals")
         for target in part:
-            matrix.add_column(target.label)
+            matrix.add_column(Text(target.label))
         for team in found.teams:
             scores = [found.cells[team.label, target.label]["score"] for target in part]
-            matrix.add_row(team.label, *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
+            matrix.add_row(Text(team.label), *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
         matrices.append(matrix)
     exploited = Table(
         "member", "strongest opponent so far", "score", "with the response", "gain", title="best responses"
     )
     for e in found.exploited:
-        exploited.add_row(e.label, e.opponent, str(e.before["score"]), str(e.after["score"]), f"{e.gain:+.3f}")
+        numbers = str(e.before["score"]), str(e.after["score"]), f"{e.gain:+.3f}"
+        exploited.add_row(Text(e.label), Text(e.opponent), *numbers)
     return [*matrices, exploited] if found.exploited else matrices
 
 
