@@ -10,7 +10,7 @@ from stable_baselines3 import PPO
 from tests.support.runs import HORIZON, quiet, small
 
 import posse
-from posse_baselines import BasePolicy
+from posse_baselines import BasePolicy, load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.checkpoint import read_checkpoint, restore_model
@@ -92,6 +92,20 @@ def test_imitation_copies(tmp_path: Path) -> None:
     # The statistics are those of the expert's observations.
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     np.testing.assert_allclose(normaliser.mean, statistics.mean, rtol=1e-5, atol=1e-6)
+
+
+def test_an_imitated_expert_is_told_of_episodes_that_begin_anew(tmp_path: Path) -> None:
+    class Spy(type(load("pursuit"))):  # type: ignore[misc]
+        def restart(self, memory: Any, mask: Any) -> Any:
+            told.append(int(mask.sum()))
+            return super().restart(memory, mask)
+
+    told: list[int] = []
+    settings = small(tmp_path, imitate="pursuit", imitate_rounds=1, overrides={"terminate_on_contact": True})
+    env = make_env(settings)
+    model = ALGORITHMS[settings.algorithm].make(settings, env)
+    imitate(model, settings, env.encoding, Spy(), RunningStatistics(env.encoding.size), lambda line: None)
+    assert sum(told) > 0
 
 
 @pytest.mark.parametrize(

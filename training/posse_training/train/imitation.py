@@ -130,9 +130,14 @@ def _play_round(
         chosen.append(wanted[:, :, :parts].reshape(-1, parts))
         rewards.append(reward.reshape(-1))
         touching = settings.end_on_contact & batch.arrays.tracker["touching"].any(axis=1)
-        goes_on.append(np.repeat(~touching, trackers))
-        if (terminated | truncated).all():
+        over = terminated | truncated
+        goes_on.append(np.repeat(~(touching | over), trackers))
+        if over.all():
             break
+        if over.any():
+            observations = batch.reset(options={"reset_mask": over})
+            memory = expert.restart(memory, over)
+            slots.restart(over)
     returns = np.array(rewards, np.float32)  # (steps, rows), discounted
     for t in reversed(range(len(rewards) - 1)):
         returns[t] += np.float32(settings.discount) * returns[t + 1] * goes_on[t]

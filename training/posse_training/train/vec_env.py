@@ -199,12 +199,12 @@ class SlotGroup:
         """Start a shortened episode in every world; return the observations (slots, size)."""
         raw = self.batch.reset(seed=seed, options=options)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
-        self._begin(np.ones(worlds, np.bool_))
+        self.restart(np.ones(worlds, np.bool_))
         self._seen = raw
         self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
         return self.encode(raw)
 
-    def _begin(self, mask: BoolArray) -> None:
+    def restart(self, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,)."""
         self._encoder.restart(mask)
         if self._guard is not None:
@@ -230,7 +230,7 @@ class SlotGroup:
         if ended.any():
             self._report(raw, ended, terminated, over, infos)
             raw = batch.reset(options={"reset_mask": ended})
-            self._begin(ended)
+            self.restart(ended)
         self._seen = raw
         terms = {name: told[f"reward/{name}"] for name in batch.term_names}
         return self.encode(raw), reward.reshape(-1), np.repeat(ended, batch.action_shape[1]), infos, terms
