@@ -155,6 +155,10 @@ class Recorder:
             observations, rewards = every.observations, every.rewards
             terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
         notes = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
+        rows_of_all = self.batch.action_shape[:2]
+        for name, value in notes.items():
+            if value.dtype.kind not in "biuf" or value.shape[:2] != rows_of_all:
+                raise ValueError(f"{name} must be numbers of shape {rows_of_all}, got {value.dtype} of {value.shape}")
         rows: dict[str, Array] = {
             "score": infos["score"],
             "rewards": rewards,

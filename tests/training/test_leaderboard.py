@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from posse_baselines.registry import shipped
-from posse_training import cli, evaluate
+from posse_training import cli, evaluate, leaderboard
 from posse_training.errors import PlayError, SettingsError
-from posse_training.leaderboard import CLAIM, Standing, standings_text, submit, verify
+from posse_training.leaderboard import CLAIM, Standing, measure, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
 WORLDS = 60
@@ -62,11 +62,14 @@ def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dic
         verify(sent(tmp_path, claim, policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
 
 
-def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
+def test_a_policy_file_travels_with_its_claim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = tmp_path / "mine.safetensors"
-    given.write_bytes(shipped()["learned-smart"].read_bytes())
+    given.write_bytes(content := shipped()["learned-smart"].read_bytes())
     out = tmp_path / "sent"
+    replaced = lambda *claim: (given.write_bytes(b"by a training"), measure(*claim))[1]  # noqa: E731
+    monkeypatch.setattr(leaderboard, "measure", replaced)
     assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--episodes", "3", "--out", str(out)]) == 0
+    assert (out / given.name).read_bytes() == content, "the one that played"
     given.unlink()
     assert sorted(file.name for file in out.iterdir()) == ["mine.safetensors", CLAIM]
     assert verify(out, episodes=3)[1].policy == "mine.safetensors"

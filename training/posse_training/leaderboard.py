@@ -145,7 +145,9 @@ def submit(
         ScenarioError: An unknown scenario; nothing is played.
         PlayError: An error of the policy's own code.
     """
-    loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
+    is_file = not is_code(policy) and policy not in policy_names()
+    content = Path(policy).read_bytes() if is_file else b""  # before it plays: a training may replace the file
+    loaded = load(policy)
     text = Path(policy).name if is_file else policy
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
@@ -155,7 +157,7 @@ def submit(
     with played_errors():
         claim = measure(label, text, loaded, scenario, episodes, SEED)
     if is_file:
-        write_atomically(out / text, Path(policy).read_bytes())
+        write_atomically(out / text, content)
     write_atomically(out / CLAIM, standings_text([claim]).encode())
     return claim
 

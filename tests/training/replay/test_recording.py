@@ -25,6 +25,14 @@ def close(columns: dict[str, Any], name: str, frame: int, value: Any, angle: boo
     assert np.abs(off).max(initial=0) <= allowed
 
 
+@pytest.mark.parametrize("value", [np.full((1, 5), "calm"), np.zeros(1), None])
+def test_annotations_that_are_no_numbers_of_each_tracker_are_refused(value: Any) -> None:
+    recorder = Recorder(posse.batch("constant"), ["annotations"])
+    recorder.reset()
+    with pytest.raises(ValueError, match=r"annotation/mood must be numbers of shape \(1, 5\)"):
+        recorder.step(np.zeros((1, 5, 2)), {"mood": value})
+
+
 @pytest.mark.parametrize(
     ("policy", "scenario"),
     [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss"), ("pngl", "robots")],

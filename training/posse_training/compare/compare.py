@@ -112,17 +112,18 @@ def compare(settings: Settings, *, console: Console | None = None) -> "Compariso
             except PlayError as error:
                 raise SettingsError(f"target={settings.target!r:.120} cannot be loaded: {error}") from error
         refuse_trained_split(load_target(settings.target), settings.split)
-    folder = _free(settings.out)
+    if settings.out is not None:
+        check_new(settings.out)
     if settings.ray is not False:
         require("cluster", "ray")
-    found = Comparison(settings, scenarios, contenders, folder)
+    found = Comparison(settings, scenarios, contenders)
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
         if settings.ray is not False:
             report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
             stack.enter_context(found.played_on_ray(settings.ray, report))
             bar.reset(task, total=len(scenarios) * len(contenders))
-        folder.mkdir(parents=True, exist_ok=True)
+        found.folder = _new_folder(settings.out)
         for scenario in scenarios:
             found.play(scenario, lambda what: bar.update(task, description=what, advance=1))
         found.write()
@@ -141,13 +142,19 @@ def _checked(settings: Settings) -> list[Scenario | Family]:
     return found
 
 
-def _free(out: Path | None) -> Path:
-    """Return a folder that is new or empty."""
-    if out is None:
-        names = itertools.chain(["compare"], (f"compare-{k}" for k in itertools.count(2)))
-        return next(path for name in names if not (path := Path("runs", name)).exists())
-    check_new(out)
-    return out
+def _new_folder(out: Path | None) -> Path:
+    """Return a folder that is made here, so that two comparisons at once have two; or the given one."""
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        return out
+    k, folder = 1, Path("runs", "compare")
+    while True:
+        try:
+            folder.mkdir(parents=True)
+            return folder
+        except FileExistsError:
+            k += 1
+            folder = Path("runs", f"compare-{k}")
 
 
 @dataclass
@@ -157,7 +164,7 @@ class Comparison:
     settings: Settings
     scenarios: Sequence[Scenario | Family]
     contenders: Sequence[Contender]
-    folder: Path
+    folder: Path = field(init=False)
     """Where the results are written."""
     plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
     """By scenario and policy."""
@@ -236,8 +243,6 @@ class Comparison:
     def write(self) -> None:
         """Write summary, export, figures and report."""
         s = self.settings
-        if s.figures:
-            self._report()
         if "marl-eval" in s.export:
             write_marl_eval(self.plays, self.folder / "marl-eval.json")
         rows = [{k: asdict(v) if isinstance(v, Estimate) else v for k, v in row.items()} for row in self.rows]
@@ -245,6 +250,8 @@ class Comparison:
         about["changed"] = s.overrides
         about |= {"comparison": rows, "left_out": self.left_out, "failed": self.failed}
         (self.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+        if s.figures:
+            self._report()
 
     def _attempt(self, contender: Contender, scenario: Scenario | Family) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
