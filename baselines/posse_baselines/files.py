@@ -39,8 +39,9 @@ def replacing(path: Path) -> Iterator[Path]:
         finally:
             partial.unlink(missing_ok=True)
     except OSError as error:
-        error.filename = str(path)
-        del error.filename2  # else a rename's, or None, is printed, too
+        if error.errno is not None:
+            error.filename = str(path)
+            del error.filename2  # else a rename's, or None, is printed, too
         raise
 
 

@@ -155,7 +155,7 @@ def _from_module(text: str) -> Any:
             raise AttributeError(unknown("name", attribute, [name for name in vars(module) if name[0] != "_"]))
         found: Any = getattr(module, attribute)
         return found() if isinstance(found, type) else found
-    except Exception as error:  # whatever the code of the module or the class raises
+    except (Exception, SystemExit) as error:  # whatever the code of the module or the class raises
         raise PolicyError(
             f"{text!r:.120} cannot be imported, or created without arguments: {type(error).__name__}: {error}; write "
             "package.module:Class, for example my_policies:Circle"

@@ -6,6 +6,7 @@ Each command is imported when it is called: listing the scenarios does not impor
 import argparse
 import difflib
 import importlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, Final
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for module in known.modules:
         try:
             importlib.import_module(module)
-        except Exception as error:  # whatever the module raises
+        except (Exception, SystemExit) as error:  # whatever the module raises
             why = f"{type(error).__name__}: {error}; name a module that is installed, or in this folder"
             print(f"posse: --import {module}: {why}", file=sys.stderr)
             return 2
@@ -88,6 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if not isinstance(error, (UserError, ScenarioError, DeclarationError, PolicyError, OSError)):
             raise
+        if isinstance(error, BrokenPipeError):  # what reads the output, such as head, has read enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
         print(f"posse {name}: {error}", file=sys.stderr)
         return 2
 

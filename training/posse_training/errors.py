@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import os
 import traceback
 from pathlib import Path
 from typing import Any
@@ -66,7 +67,7 @@ def describe(error: BaseException) -> str:
     if isinstance(error, PlayError):
         return str(error)
     found = [importlib.util.find_spec(name) for name in ("posse", "posse_baselines", "posse_training")]
-    ours = tuple(str(Path(spec.origin).parent) for spec in found if spec is not None and spec.origin)
+    ours = tuple(f"{Path(spec.origin).parent}{os.sep}" for spec in found if spec is not None and spec.origin)
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
     where = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {' '.join(str(error).split()):.300}{where}"

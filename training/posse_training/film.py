@@ -40,7 +40,9 @@ class Team:
         place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
         self.batch = batch_for(policy, scenario, 1, target, **place, autoreset="disabled")
         self.scores: list[float] = []  # of each step
-        self._memory, self._observations = begin(policy, self.batch), self.batch.reset()
+        with played_errors():
+            self._memory = begin(policy, self.batch)
+        self._observations = self.batch.reset()
         self.told: Annotations = {}
 
     @property

@@ -62,7 +62,7 @@ def apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-c", f"from {__name__} import _answer; _answer()"],
+            [sys.executable, "-P", "-c", f"from {__name__} import _answer; _answer()"],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
             input=cloudpickle.dumps((limit, installed(), users_modules(), function, *arguments)),
             stdout=subprocess.PIPE,

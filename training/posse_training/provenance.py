@@ -26,6 +26,7 @@ def commit() -> str | None:
         return done.stdout.strip()
 
     try:
+        git("ls-files", "--error-unmatch", Path(__file__).name)  # else it is installed within another repository
         # Changes of pages and results do not count.
         sources = [f":/{root}" for root in ("envs", "baselines", "training")]
         changed = git("status", "--porcelain", "--", *sources, ":(exclude,top)**/shipped/*")

@@ -6,7 +6,7 @@ The run folder holds ``state.json``, from which the same command resumes.
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -168,7 +168,8 @@ class _Run:
         self.settings, self.console = settings, console
         self.policy = policy = cast("Any", load(settings.policy))
         is_tunable = hasattr(policy, "with_settings") and not getattr(policy, "trained_splits", ())
-        self.tunables = tunables(policy.settings) if is_tunable else ()
+        settled = getattr(policy, "settings", None)
+        self.tunables = tunables(settled) if is_tunable and is_dataclass(settled) else ()
         if not self.tunables:
             raise PolicyError(
                 f"policy {settings.policy!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}"

@@ -15,6 +15,7 @@ from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_training.errors import SettingsError, require
+from posse_training.replay.format import to_json
 
 _OPSET: Final = 13
 _IR_VERSION: Final = 8
@@ -66,7 +67,7 @@ def export(policy: LearnedPolicy, out: str | Path) -> None:
     graph = helper.make_graph(nodes, "posse", inputs, [output], initial)
     opset = [helper.make_opsetid("", _OPSET)]
     model = helper.make_model(graph, opset_imports=opset, ir_version=_IR_VERSION, producer_name="posse")
-    helper.set_model_props(model, {"columns": json.dumps(named), "policy": json.dumps(policy.description())})
+    helper.set_model_props(model, {"columns": json.dumps(named), "policy": json.dumps(to_json(policy.description()))})
     checker.check_model(model)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, model.SerializeToString())

@@ -50,7 +50,7 @@ def encode(replay: Replay) -> bytes:
         events = [vars(event) for event in player.events]
         players.append({**vars(player), "frames": player.frames, "events": events, "columns": columns})
         packed.append(_pack(np.concatenate(series)))
-    header = _to_json({"format": FORMAT, "world": replay.world, "players": players})
+    header = to_json({"format": FORMAT, "world": replay.world, "players": players})
     text = json.dumps(header, separators=(",", ":"), allow_nan=False)
     return zlib.compress(b"".join([text.encode(), b"\n", *packed]), 9)
 
@@ -103,14 +103,12 @@ def _unpack(raw: bytes, frames: int) -> npt.NDArray[np.int64]:
     return np.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
 
 
-# JSON has no infinity or nan: they are written as {"number": "inf"}.
-
-
-def _to_json(value: Any) -> Any:
+def to_json(value: Any) -> Any:
+    """Return a value for JSON, with ``{"number": "inf"}`` for an infinite number."""
     if isinstance(value, dict):
-        return {name: _to_json(part) for name, part in value.items()}
+        return {name: to_json(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_to_json(part) for part in value]
+        return [to_json(part) for part in value]
     return {"number": str(value)} if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -98,11 +98,12 @@ def check_before(settings: TrainSettings) -> None:
     if settings.algorithm == EVOLUTION:
         check_adviser(settings)
     divided(settings)
-    for policy in (settings.imitate, settings.beside):
+    goes_on = (settings.run_folder / checkpoint.CHECKPOINT).exists()
+    for policy in (settings.beside, None if goes_on else settings.imitate):
         if policy is not None:
             LOAD[settings.side](policy)
-    if (settings.run_folder / checkpoint.CHECKPOINT).exists():
-        return  # the run goes on: what follows is about its beginning
+    if goes_on:
+        return  # what follows is about the beginning of a run
     kind, first = ALGORITHMS.get(settings.algorithm), settings.learning_starts
     if kind is not None and not kind.on_policy and first >= settings.steps:
         raise SettingsError(f"learning_starts={first} must be below steps={settings.steps}: lower it")
