@@ -57,11 +57,13 @@ def obey(c: Record, t: Record, wanted: FloatArray) -> None:
     if c.actuator_lag > ZERO:
         to_speed = t.speed + c.followed * (to_speed - t.speed)
         to_turn = t.turn_rate + c.followed * (to_turn - t.turn_rate)
-    t.speed = approach(t.speed, to_speed, c.speed_change)
     t.turn_rate = approach(t.turn_rate, to_turn, c.turn_change)
     if c.wheel_base > ZERO:
-        left = t.max_speed - HALF * c.wheel_base * abs(t.turn_rate)
-        t.speed = lesser(t.speed, greater(left, ZERO))  # on the spot, rounding may leave less than nothing
+        left = greater(t.max_speed - HALF * c.wheel_base * abs(t.turn_rate), ZERO)  # less than nothing by rounding
+        to_speed, slowest = lesser(to_speed, left), t.speed - c.speed_change
+        if slowest > left:  # it turns as fast as its speed, which cannot fall faster, leaves
+            t.turn_rate *= (t.max_speed - slowest) / (t.max_speed - left)
+    t.speed = approach(t.speed, to_speed, c.speed_change)
 
 
 @compiled

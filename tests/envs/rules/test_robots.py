@@ -47,10 +47,13 @@ def test_commands_are_executed_after_the_delay() -> None:
 def test_no_wheel_turns_faster_than_the_greatest_speed(seed: int, lag: float, acceleration: float) -> None:
     batch = posse.batch("field", 2, wheel_base=0.6, actuator_lag=lag, tracker_acceleration=acceleration)
     batch.reset(seed=seed)
-    for _ in range(30):
-        drive(batch, 1, seed)
-        wheel = batch.arrays.tracker["speed"] + 0.3 * np.abs(batch.arrays.tracker["turn_rate"])
-        assert (wheel <= batch.arrays.tracker["max_speed"] * (1 + 1e-6)).all()
+    for step in range(30):
+        before = batch.arrays.tracker["speed"].copy()
+        drive(batch, 1, seed + step)
+        after, free = batch.arrays.tracker, batch.working & (batch.arrays.tracker["touching"] == 0)
+        assert (np.abs(after["speed"] - before)[free] <= acceleration * batch.scenario.control_step + 1e-5).all()
+        wheel = after["speed"] + 0.3 * np.abs(after["turn_rate"])
+        assert (wheel <= after["max_speed"] * (1 + 1e-6)).all()
 
 
 def test_a_robot_that_turns_as_fast_as_its_wheels_can_stands() -> None:
