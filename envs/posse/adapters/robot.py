@@ -8,9 +8,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import SENSORS
+from posse.declarations import SENSORS, is_number
 from posse.engine.arguments import MOST_ACTION, real_numbers
 from posse.engine.batch import Batch
+from posse.engine.kernels import START
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
@@ -99,7 +100,7 @@ class Robot:
             raise ScenarioError(f"sensor={self.scenario.sensor!r} gives bearings; a robot needs a sensor of positions")
         if check_count("number", number, 0) >= self.scenario.num_trackers:
             raise ValueError(f"number={number} must be from 0 to {self.scenario.num_trackers - 1}, one of the team's")
-        if not (math.isfinite(scale) and scale > 0):
+        if not (is_number(scale) and scale > 0):
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
@@ -112,7 +113,8 @@ class Robot:
 
     def reset(self) -> None:
         """Forget everything: the next observation is the first of an episode."""
-        self._world.reset(seed=0)
+        self._world._execute(np.ones(1, np.bool_), START)  # no reset: where the robots are drawn plays no part
+        self._world._started = True
         arrays = self._world.arrays
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
         self._me.fix_step, self._me.sees = -1, 0
@@ -162,7 +164,7 @@ class Robot:
         readings = None if sonar is None else np.asarray(sonar, np.float64)
         if readings is not None and (readings.shape != (beams,) or not readings.min(initial=0.0) >= 0.0):
             raise ValueError(f"sonar={sonar!r} must be {beams} distances of at least 0 m")
-        messages = [self._checked(message) for message in heard]
+        messages = [self._checked(message) for message in heard or ()]
         fix = None if target_fix is None else self._checked_fix(target_fix)
 
         self.steps, self._told = self.steps + 1, self._said
@@ -173,10 +175,12 @@ class Robot:
         me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, bool(touching), fix is not None
         for message in messages:
             self._hear(message)
-        fixes = [] if fix is None else [fix]
-        fixes += [each.fix._replace(age=each.fix.age + each.age) for each in messages if each.fix is not None]
-        for each in fixes:
-            self._take(each)
+        if fix is not None:
+            self._take(fix)
+        self._to_tell = self._best_fix()  # as a tracker, which sends before it hears
+        for each in messages:
+            if each.fix is not None:
+                self._take(each.fix._replace(age=each.fix.age + each.age))
         row: FloatArray = self._world.observe()[0, self.number].copy()
         if beams:
             reach = self.scenario.sonar_range
@@ -205,22 +209,26 @@ class Robot:
         """Return what team-mates should hear of it now: its last measurements, and what its policy said before."""
         if self.steps < 0:
             raise ValueError("broadcast before the first observation: call observe() first")
-        me, fix = self._me, None
-        if me.fix_step >= 0:
-            fix = TargetFix(
-                float(me.fix.x) / self.scale,
-                float(me.fix.y) / self.scale,
-                math.atan2(me.fix.sin, me.fix.cos),
-                (self.steps - int(me.fix_step)) * self.scenario.control_step,
-                math.atan2(me.fix.frame_sin, me.fix.frame_cos),
-            )
-        return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._told, fix)
+        motion = float(self._me.speed) / self.scale, float(self._me.turn_rate)
+        return Heard(self.number, *self._pose, *motion, self._told, self._to_tell)
+
+    def _best_fix(self) -> TargetFix | None:
+        me = self._me
+        if me.fix_step < 0:
+            return None
+        return TargetFix(
+            float(me.fix.x) / self.scale,
+            float(me.fix.y) / self.scale,
+            math.atan2(me.fix.sin, me.fix.cos),
+            (self.steps - int(me.fix_step)) * self.scenario.control_step,
+            math.atan2(me.fix.frame_sin, me.fix.frame_cos),
+        )
 
     def _checked(self, given: Any) -> Heard:
         if not isinstance(given, (tuple, list)) or not 6 <= len(given) <= len(Heard._fields):
             raise ValueError(f"heard {given!r:.80}: give a list of posse.Heard, as broadcast() returns them")
         message = Heard(*given)  # also of JSON's list
-        said = tuple(message.message)
+        said = tuple(np.atleast_1d(message.message))
         _finite("a message heard", (*message[1:6], *said), (5 + len(said),))
         _check_age(message.age)
         number = check_count("heard number", message.number, 0)
@@ -234,13 +242,13 @@ class Robot:
             warnings.warn(f"{late}: set it to that of the real radio", stacklevel=2)  # one text, which is shown once
         return message._replace(message=said, fix=None if message.fix is None else self._checked_fix(message.fix))
 
-    def _checked_fix(self, fix: TargetFix) -> TargetFix:
-        if not 3 <= len(fix) <= 5:
+    def _checked_fix(self, fix: Any) -> TargetFix:
+        if not isinstance(fix, (tuple, list)) or not 3 <= len(fix) <= 5:
             raise ValueError(f"fix={fix!r} must be x, y, heading, and perhaps age and frame")
-        fix = TargetFix(*fix)  # also of JSON's list
-        _finite("a fix", [value for value in fix if value is not None], (5 - (fix.frame is None),))
-        _check_age(fix.age)
-        return fix
+        checked = TargetFix(*fix)  # also of JSON's list
+        _finite("a fix", [value for value in checked if value is not None], (5 - (checked.frame is None),))
+        _check_age(checked.age)
+        return checked
 
     def _step_of(self, number: int, age: float) -> int | None:
         """Return the step of a pose or fix, the first one if it is older; ``None``: it is not newer than the last."""
@@ -288,7 +296,7 @@ def _place(record: Any, x: float, y: float, heading: float, prefix: str = "headi
 
 
 def _check_age(age: float) -> None:
-    if not 0.0 <= age < math.inf:
+    if not (is_number(age) and age >= 0.0):
         raise ValueError(f"age={age!r} must be the seconds since then, at least 0")
 
 
