@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import posse
 from posse import ScenarioError
+from posse.declarations import FIELDS
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.evaluation.statistics import mean
@@ -79,6 +80,18 @@ def test_teams_of_many_sizes_stand_side_by_side() -> None:
     assert sum(batch.num_worlds for batch in batches) == 64
     assert {batch.scenario.num_trackers for batch in batches} == {3, 4, 5, 6, 7}
     assert {batch.layout.size for batch in batches} == {batches[0].layout.size}
+
+
+def test_a_field_that_only_some_scenarios_have_is_refused(request: pytest.FixtureRequest) -> None:
+    request.addfinalizer(lambda: FIELDS.pop("crowd"))
+
+    @posse.field("1", 0, 60, when=lambda s: s.num_obstacles > 3)
+    def crowd(c: Any) -> Any:
+        """Number of obstacles."""
+        return c.num_obstacles
+
+    with pytest.raises(posse.ScenarioError, match="a field's when= must be alike for all scenarios"):
+        posse.family("obstacles", num_obstacles=(0, 8), extra_fields=("crowd",))
 
 
 def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
 from posse.engine.arguments import mask_of
 from posse.numeric import BoolArray, FloatArray
-from posse.scenarios import Scenario
+from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.setting import check_count
 
 _Info = dict[str, Any]
@@ -48,6 +48,8 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         autoreset: str | AutoresetMode = "next_step",
         **settings: Any,
     ) -> None:
+        if "num_worlds" in settings:
+            raise ScenarioError("num_worlds= is that of a batch: here it is num_envs=")
         self.num_envs = check_count("num_envs", num_envs, 1)
         mode = autoreset.name.lower() if isinstance(autoreset, AutoresetMode) else autoreset
         super().__init__(scenario, self.num_envs, autoreset=mode, **settings)

@@ -20,7 +20,8 @@ class TargetPolicy(Protocol):
     """Moves the target of every world; it observes the trackers without error.
 
     A policy of one robot: what the target observes has the fields of a tracker's observation, with
-    the trackers in the places of team-mates. What the policy remembers is in its memory.
+    the nearest ``num_neighbours`` trackers in the places of team-mates: by default all but the farthest, so one tracker
+    alone is not observed. What the policy remembers is in its memory.
     """
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
@@ -68,6 +69,8 @@ class PairedBatch(Batch):
         scenario, one = get_scenario(scenario), not isinstance(outside, str)
         if one and check_count("outside", outside, 0) >= scenario.num_trackers:
             raise ScenarioError(f"outside={outside} is not in the team: trackers are 0 to {scenario.num_trackers - 1}")
+        if one and scenario.target_is_agent:
+            raise ScenarioError(f"outside={outside} leaves nothing to move the target: choose another target_motion")
         if not one:
             check_choice("outside", outside, ("trackers", "target"))
         super().__init__(scenario if one else scenario.replace(target_motion="agent"), num_worlds, **settings)
@@ -148,10 +151,11 @@ def batch(
     found = get_scenario(scenario, **settings)
     if target_policy is not None and team_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
+    inside: Any
     inside, side = (team_policy, "team") if target_policy is None else (target_policy, "target")
     if inside is None:
         return Batch(found, num_worlds, **own)
-    if not isinstance(inside, TargetPolicy):
+    if not isinstance(inside, TargetPolicy) or isinstance(inside, type):
         raise TypeError(f"{side}_policy={reprlib.repr(inside)} lacks begin, act or restart (posse.TargetPolicy)")
     outside = "trackers" if side == "target" else "target"
     return PairedBatch(found, num_worlds, inside, outside=outside, **own)

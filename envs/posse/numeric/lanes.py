@@ -117,7 +117,7 @@ for _operator, _instruction in (
     (operator.truediv, ir.IRBuilder.fdiv),
 ):
     _emits(_instruction, _LANES, _LANES, _LANES)(_operator)
-for _name, _sign in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "=="}.items():
+for _name, _sign in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}.items():
     _emits(_compare(_sign), _MASK, _LANES, _LANES)(getattr(operator, _name))
 _emits(ir.IRBuilder.and_, _MASK, _MASK, _MASK)(operator.and_)
 _emits(ir.IRBuilder.or_, _MASK, _MASK, _MASK)(operator.or_)

@@ -88,7 +88,9 @@ def grid(d: Drawing) -> None:
 
     Grid lines would change every row of a video with a moving view; crosses compress better.
     """
-    low, high = np.ceil(d.camera.floor() / _GRID_STEP)
+    reach = np.array(d.camera.viewport[2:]) / (2 * d.camera.scale) + _GRID_STEP
+    in_view = np.clip(d.camera.floor(), d.camera.centre - reach, d.camera.centre + reach)
+    low, high = np.ceil(in_view / _GRID_STEP)
     columns, rows = (np.arange(a, b) * _GRID_STEP for a, b in zip(low, high, strict=True))
     crosses = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     for place in d.camera.project(crosses):

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.declarations import unknown
+from posse.declarations import Declarations, unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import SPLITS, ScenarioError, UnknownSettingError, check_choice, check_count, fail
@@ -55,7 +55,9 @@ class Family:
             )
         corners = itertools.product(*(dict.fromkeys(bounds) for _, bounds in self.ranges))
         for values in itertools.islice(corners, 1024):  # of many ranges, some
-            self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
+            one = self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
+            if Declarations.of(one).fields != Declarations.of(self.base).fields:
+                fail("extra_fields", one.extra_fields, "a field's when= must be alike for all scenarios of a family")
 
     @property
     def version(self) -> int:

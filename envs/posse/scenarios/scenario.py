@@ -488,7 +488,9 @@ def _in_declarations(s: Scenario) -> _Conflicts:
         ("target_reward_weights", dict(s.target_reward_weights), "term of a target", of_target),
     ):
         for name in names:
-            if name not in known:
+            if name in REWARD_TERMS and name not in known:
+                yield where, f"{name!r} has no formula for a target: declare one by target=, or leave it out"
+            elif name not in known:
                 yield where, undeclared(kind, name, known)
     for name in (name for name in s.extra_fields if FIELDS[name].built_in):
         yield "extra_fields", f"{name!r} is in every observation: leave it out"

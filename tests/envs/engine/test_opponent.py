@@ -128,6 +128,10 @@ def test_an_object_that_is_no_target_policy_is_refused() -> None:
         posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
     with pytest.raises(TypeError, match="begin, act or restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="begin, act or restart"):
+        posse.batch(SHORT, 1, target_policy=Weaver)  # type: ignore[arg-type]
+    with pytest.raises(posse.ScenarioError, match="leaves nothing to move the target"):
+        posse.PairedBatch(SHORT.replace(target_motion="agent"), 1, Crossing(), outside=1)
     for outside, words in (("tracker", "known: trackers, target"), (2, "not in the team"), (1.0, "whole number")):
         with pytest.raises(posse.ScenarioError, match=words):
             posse.PairedBatch(SHORT, 1, Crossing(), outside=outside)  # type: ignore[arg-type]

@@ -45,7 +45,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"extra_fields": ("speed",)}, "in every observation"),
     ({"metrics": ("score", "score")}, "each once"),
     ({"reward_weights": {"slots": 1.0}}, "did you mean 'slot'"),
-    ({"target_reward_weights": {"slot": 1.0}}, "term of a target 'slot'"),
+    ({"target_reward_weights": {"slot": 1.0}}, "'slot' has no formula for a target"),
 ]
 
 
