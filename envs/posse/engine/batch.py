@@ -70,7 +70,7 @@ class Batch(OwnArrays):
         clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
 
     Attributes:
-        arrays: The state of the worlds; writing to it changes them.
+        arrays: The state of the worlds; writing to it changes them (poses: by options of :meth:`reset`).
         layout: Position of each field in an observation.
         term_names: Names of the reward terms, in the order in which they are reported.
         observation_shape: (E, rows, F); rows = N, plus one if the target is an agent.
