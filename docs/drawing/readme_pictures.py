@@ -29,11 +29,11 @@ SHOWN: Final = {
     "accelerating": ("ddcs-distributed", 14.0),
     "smart": ("learned-smart", 18.0),
     "search": ("ddcs-distributed", 24.0),
-    "obstacles": ("learned-obstacles", 22.0),
-    "radio": ("learned-radio", 10.0),
+    "obstacles": ("learned-obstacles", 32.0),
+    "radio": ("learned-radio", 14.0),
     "leader-loss": ("pngl-l-phi", 20.0),
     "field": ("learned-field", 26.0),
-    "duel": ("learned-smart", 18.0),
+    "duel": ("learned-smart", 26.0),
     "robots": ("ddcs-distributed", 57.0),
 }
 """The team on each scenario, and after how many seconds."""

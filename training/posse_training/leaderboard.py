@@ -145,9 +145,8 @@ def submit(
         ScenarioError: An unknown scenario; nothing is played.
         PlayError: An error of the policy's own code.
     """
-    is_file = not is_code(policy) and policy not in policy_names()
+    loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     content = Path(policy).read_bytes() if is_file else b""  # before it plays: a training may replace the file
-    loaded = load(policy)
     text = Path(policy).name if is_file else policy
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)

@@ -168,8 +168,8 @@ class _Run:
         self.settings, self.console = settings, console
         self.policy = policy = cast("Any", load(settings.policy))
         is_tunable = hasattr(policy, "with_settings") and not getattr(policy, "trained_splits", ())
-        settled = getattr(policy, "settings", None)
-        self.tunables = tunables(settled) if is_tunable and is_dataclass(settled) else ()
+        own = getattr(policy, "settings", None)
+        self.tunables = tunables(own) if is_tunable and is_dataclass(own) else ()
         if not self.tunables:
             raise PolicyError(
                 f"policy {settings.policy!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}"
