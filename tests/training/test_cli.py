@@ -96,7 +96,7 @@ INVALID = {
     "train --team idle": "team='idle' is of the side that learns, side='trackers'",
     "train --side target --team None": "set team",
     "train --side target --encoding features": "encoding='features'",
-    "train --side target --reward-weights slot=1.0": "unknown term of a target 'slot'",
+    "train --side target --reward-weights slot=1.0": "'slot' has no formula for a target",
     "train --imitate pursuit": "safeguard=True does not go with imitate='pursuit'",
     "train --preset residual --advise planner": "'planner'",
     "train --wandb project": "pip install wandb",
