@@ -256,14 +256,11 @@ class League:
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
     """Train the generations that are missing, play all against all, train best responses."""
-    from posse_training.train.algorithms import check_algorithm  # these import torch
-    from posse_training.train.worlds import divided
+    from posse_training.train.train import check_before  # torch
 
     found = League(settings, console or Console())
     for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
-        first = found.training(side, settings.path, ",".join(others))
-        check_algorithm(first)
-        divided(first)
+        check_before(found.training(side, settings.path, ",".join(others)))
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))

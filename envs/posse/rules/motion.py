@@ -59,9 +59,9 @@ def obey(c: Record, t: Record, wanted: FloatArray) -> None:
         to_turn = t.turn_rate + c.followed * (to_turn - t.turn_rate)
     t.turn_rate = approach(t.turn_rate, to_turn, c.turn_change)
     if c.wheel_base > ZERO:
-        left = greater(t.max_speed - HALF * c.wheel_base * abs(t.turn_rate), ZERO)  # less than nothing by rounding
+        left = greater(t.max_speed - HALF * c.wheel_base * abs(t.turn_rate), ZERO)  # rounding could give less than 0
         to_speed, slowest = lesser(to_speed, left), t.speed - c.speed_change
-        if slowest > left:  # it turns as fast as its speed, which cannot fall faster, leaves
+        if slowest > left:  # the speed cannot fall that far in a step: the turn is limited instead
             t.turn_rate *= (t.max_speed - slowest) / (t.max_speed - left)
     t.speed = approach(t.speed, to_speed, c.speed_change)
 

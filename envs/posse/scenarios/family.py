@@ -53,10 +53,11 @@ class Family:
                 varied["num_trackers"],
                 "team sizes of a family need num_neighbours, so that all observations have one length",
             )
+        fields = Declarations.of(self.base).fields
         corners = itertools.product(*(dict.fromkeys(bounds) for _, bounds in self.ranges))
         for values in itertools.islice(corners, 1024):  # of many ranges, some
             one = self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
-            if Declarations.of(one).fields != Declarations.of(self.base).fields:
+            if Declarations.of(one).fields != fields:
                 fail("extra_fields", one.extra_fields, "a field's when= must be alike for all scenarios of a family")
 
     @property

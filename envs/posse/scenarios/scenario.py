@@ -488,7 +488,7 @@ def _in_declarations(s: Scenario) -> _Conflicts:
         ("target_reward_weights", dict(s.target_reward_weights), "term of a target", of_target),
     ):
         for name in names:
-            if name in REWARD_TERMS and name not in known:
+            if known is of_target and name in REWARD_TERMS and name not in known:
                 yield where, f"{name!r} has no formula for a target: declare one by target=, or leave it out"
             elif name not in known:
                 yield where, undeclared(kind, name, known)
