@@ -24,6 +24,18 @@ A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
+def turned(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a vector turned to the left by an angle."""
+    return x * cosine - y * sine, x * sine + y * cosine
+
+
+@compiled
+def in_frame(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a vector in the frame of a heading: ahead, and to the left. Inverse of :func:`turned`."""
+    return x * cosine + y * sine, y * cosine - x * sine
+
+
+@compiled
 def arc(
     cosine: np.float32, sine: np.float32, speed: np.float32, turn_rate: np.float32, time: np.float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
@@ -36,25 +48,11 @@ def arc(
     sinc = ONE - h2 * _C6 * (ONE - h2 * _C20 * (ONE - h2 * _C42))  # sin(h) / h, for |h| ≤ 0.5
     ch, sh = ONE - h2 * HALF * (ONE - h2 * _C12 * (ONE - h2 * _C30 * (ONE - h2 * _C56))), h * sinc
     chord = speed * time * sinc
-    middle_c = cosine * ch - sine * sh
-    middle_s = sine * ch + cosine * sh
-    new_c = middle_c * ch - middle_s * sh
-    new_s = middle_s * ch + middle_c * sh
+    middle_c, middle_s = turned(cosine, sine, ch, sh)
+    new_c, new_s = turned(middle_c, middle_s, ch, sh)
     # One Newton step keeps the heading a unit vector over any number of steps.
     scale = _THREE_HALVES - HALF * (new_c * new_c + new_s * new_s)
     return chord * middle_c, chord * middle_s, new_c * scale, new_s * scale
-
-
-@compiled
-def turned(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
-    """Return a vector turned to the left by an angle."""
-    return x * cosine - y * sine, x * sine + y * cosine
-
-
-@compiled
-def in_frame(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
-    """Return a vector in the frame of a heading: ahead, and to the left. Inverse of :func:`turned`."""
-    return x * cosine + y * sine, y * cosine - x * sine
 
 
 @compiled
@@ -71,8 +69,7 @@ def turn_towards(
 
     By the shorter turn; from exactly the opposite heading, either.
     """
-    along = cosine * wanted_c + sine * wanted_s
-    across = cosine * wanted_s - sine * wanted_c
+    along, across = in_frame(wanted_c, wanted_s, cosine, sine)
     # Usually the heading is out of reach or reached, and no inverse tangent is needed. The tangent
     # of the greatest turn is at most limit / near_one.
     limit = most * time
@@ -99,11 +96,9 @@ def follow_heading(
 
     ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
     """
-    along = psi_c * heading_c + psi_s * heading_s
+    along, across = in_frame(heading_c, heading_s, psi_c, psi_s)
     if along >= most_c:
         return heading_c, heading_s
-    side = most_s if psi_c * heading_s - psi_s * heading_c >= ZERO else -most_s
-    c = psi_c * most_c - psi_s * side
-    s = psi_s * most_c + psi_c * side
+    c, s = turned(psi_c, psi_s, most_c, most_s if across >= ZERO else -most_s)
     scale = _THREE_HALVES - HALF * (c * c + s * s)
     return c * scale, s * scale

@@ -124,5 +124,5 @@ def add_noise(c: Record, w: Record, number: int, dx: np.float32, dy: np.float32)
     first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
     scale = ONE + c.range_noise * first
     turn = c.bearing_noise * second
-    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
-    return scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)
+    dx, dy = turned(dx, dy, np.float32(math.cos(turn)), np.float32(math.sin(turn)))
+    return scale * dx, scale * dy
