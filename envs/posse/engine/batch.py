@@ -286,7 +286,7 @@ class Batch(OwnArrays):
             records["x"][chosen], records["y"][chosen] = x, y
             records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
         config, n = self._fixed.config, self.scenario.num_trackers
-        e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
+        e, i = first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen)
         if e < 0:
             return
         if i <= n:

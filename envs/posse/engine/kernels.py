@@ -245,18 +245,20 @@ def draw_anew(config: Records, world: Records, tracker: Records, count: int, see
 
 
 @kernel
-def first_bad_start(config: Records, world: Records, tracker: Records, obstacle: Records, chosen: BoolArray) -> int:
-    """Return ``e * (N + 2) + i`` of the first chosen world e whose robot i starts in another, an obstacle or a wall.
+def first_bad_start(
+    config: Records, world: Records, tracker: Records, obstacle: Records, chosen: BoolArray
+) -> tuple[int, int]:
+    """Return the first chosen world in which a robot starts in another, an obstacle or a wall, and this robot's number.
 
-    -1: none. The target is robot N; i = N + 1 if a scripted target has no room to turn.
+    The target is robot N; the number is N + 1 if a scripted target has no room to turn. (-1, -1): there is none.
     """
-    c, n, zero = config[0], tracker.shape[1], np.float32(0)
+    c, n = config[0], tracker.shape[1]
     for e in range(len(world)):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
         for i in range(n + 1 if chosen[e] else 0):
             x, y = (trackers[i].x, trackers[i].y) if i < n else (w.x, w.y)
-            if not is_clear(c, trackers[:i], obstacles, x, y, zero):
-                return int(e * (n + 2) + i)
+            if not is_clear(c, trackers[:i], obstacles, x, y, ZERO):
+                return e, i
         if chosen[e] and c.target_speed > 0 and not target_can_turn(c, w, obstacles):
-            return int(e * (n + 2) + n + 1)
-    return -1
+            return e, n + 1
+    return -1, -1
