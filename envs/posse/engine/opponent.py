@@ -76,14 +76,12 @@ class PairedBatch(Batch):
         super().__init__(scenario if one else scenario.replace(target_motion="agent"), num_worlds, **settings)
         self.inside, self.outside = inside, outside
         self.everyone = np.zeros(self.action_shape, np.float32), self._new_results()
-        worlds, rows, length = self.action_shape
-        team, target = slice(0, scenario.num_trackers), slice(rows - 1, rows)
-        self._mine, self._theirs = (team, target) if outside == "trackers" else (target, team)
-        if one:
-            self._mine = slice(int(outside), int(outside) + 1)
-        mine, theirs = (len(range(rows)[part]) for part in (self._mine, self._theirs))
-        self.action_shape = worlds, mine, length if outside == "trackers" else 2
-        self._their_shape = worlds, theirs, 2 if outside == "trackers" else length
+        worlds, _, length = self.action_shape
+        n = scenario.num_trackers
+        row = int(outside) if one else n  # of the single robot: a tracker among its team-mates, or the target
+        team, single = (slice(0, n), (worlds, n, length)), (slice(row, row + 1), (worlds, 1, 2))
+        mine, theirs = (team, single) if outside == "trackers" else (single, team)
+        (self._mine, self.action_shape), (self._theirs, self._their_shape) = mine, theirs
         self.observation_shape = (*self.action_shape[:2], self.layout.size)
         if hasattr(inside, "watch"):
             inside.watch(self)
@@ -91,7 +89,7 @@ class PairedBatch(Batch):
 
     @property
     def working(self) -> BoolArray:
-        """Whether each tracker that is not moved by the policy inside works, (E, rows); all if the target is not."""
+        """(E, N) whether each tracker works; if one tracker alone is moved from outside, whether it works, (E, 1)."""
         working = super().working
         return working if isinstance(self.outside, str) else working[:, self._mine]
 
