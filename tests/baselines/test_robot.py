@@ -12,7 +12,6 @@ import pytest
 
 import posse
 from posse import Batch, Heard, Robot, ScenarioError, TargetFix
-from posse.rules.state import perfect_radio
 from posse_baselines import PolicyError, begin, deploy, load
 
 SCALE = 2.0
@@ -36,7 +35,7 @@ def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
         if j == i:
             continue
         t, said = arrays.tracker[0, j], arrays.message[0, 0, j]
-        if not perfect_radio(s):
+        if not s.perfect_radio:
             if step < delay or arrays.heard[0, i, j]["step"] != step - delay:
                 continue
             t, said = arrays.broadcast[0, (step - delay) % (delay + 1), j], arrays.heard_message[0, i, j]
@@ -81,7 +80,7 @@ def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, fram
             assert (said.number, said.message) == (i, told_before[i]), "the message that led to the pose"
             told_before[i] = command.message
             assert said[1:6] == pytest.approx(motion_of(t))
-            if not perfect_radio(s):  # which has no record of what is sent, before anything is heard
+            if not s.perfect_radio:  # which has no record of what is sent, before anything is heard
                 sent = batch.arrays.broadcast[0, step % (s.radio_delay + 1), i]
                 assert (said.fix is None) == (sent.fix_step < 0)
                 if said.fix is not None:

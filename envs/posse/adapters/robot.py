@@ -15,7 +15,7 @@ from posse.engine.kernels import START
 from posse.numeric import FloatArray
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
-from posse.rules.state import BROADCAST, perfect_radio
+from posse.rules.state import BROADCAST
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.scenarios.scenario import FAR
 from posse.scenarios.setting import check_count
@@ -105,7 +105,7 @@ class Robot:
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
         kept = self.scenario
-        if perfect_radio(kept):  # such a world stores no messages, since they would equal the state
+        if kept.perfect_radio:  # such a world stores no messages, since they would equal the state
             kept = kept.replace(radio_loss=_BARELY_LOSSY)
         self._world = Batch(kept, 1, num_threads=1)
         self._config = self._world._fixed.config[0]

@@ -91,7 +91,7 @@ def reward(
     """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
         rewards[i] = made.reward(c, w, trackers[i], fixed.weights, terms[i])
-    if c.target_agent != 0:
+    if c.target_is_agent != 0:
         n = c.num_trackers
         rewards[n] = made.target_reward(c, w, fixed.target_weights, terms[n])
 

@@ -89,7 +89,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     wanted = actions
     if c.command_delay > 0:
         wanted = worlds.command[e, w.step % c.command_delay]  # in whose place the actions wait, below
-    if c.target_agent != 0:
+    if c.target_is_agent != 0:
         action = actions[c.num_trackers]
         w.speed = HALF * (action[0] + ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate

@@ -35,12 +35,6 @@ _F, _I, _U = np.float32, np.int32, np.uint64
 _NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
 
 
-def perfect_radio(s: Scenario) -> bool:
-    """Return whether working trackers always receive each other's messages without delay."""
-    reliable = not s.drifts and s.radio_delay == 0 and s.radio_loss == 0 and s.radio_outages == 0 and s.breaks == 0
-    return reliable and math.isinf(s.radio_range)
-
-
 def _frame_turn(s: Scenario) -> float:
     """Return the greatest turn of the slot frame in a control step, rad."""
     return min(s.slot_turn_rate * s.control_step, math.pi / 2)
@@ -65,7 +59,8 @@ def _share(time: float, constant: float) -> float:
 _Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
 
 DERIVED: Final[_Numbers] = {
-    **{name: (_I, attrgetter(name)) for name in ("neighbours", "physics_steps", "outage_steps", "walled", "drifts")},
+    **{name: (_I, attrgetter(name)) for name in ("neighbours", "physics_steps", "outage_steps", "walled")},
+    **{name: (_I, attrgetter(name)) for name in ("drifts", "perfect_radio", "target_is_agent")},
     "settle_steps": (_I, lambda s: min(max(1, round(s.settle_time / s.control_step)), s.horizon)),
     "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
     "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
@@ -73,12 +68,10 @@ DERIVED: Final[_Numbers] = {
     "break_nearest": (_I, lambda s: s.break_choice == "nearest"),
     "motion": (_I, lambda s: TARGET_MOTIONS.of(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
     "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and s.walled),
-    "target_agent": (_I, lambda s: s.target_is_agent),
     "sensor": (_I, lambda s: SENSORS.of(s.sensor).index(SENSORS[s.sensor])),
     "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
     "measured": (_I, _measured),  # 0: sensors return the target's true position
     "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
-    "perfect_radio": (_I, perfect_radio),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
     "whole_arcs": (_I, _whole_arcs),
     "position_step": (_F, lambda s: s.odometry_drift * math.sqrt(s.control_step)),
@@ -338,7 +331,7 @@ class WorldArrays(NamedTuple):
     def allocate(cls, scenario: Scenario, num_worlds: int) -> WorldArrays:
         """Return zeroed arrays for a number of worlds."""
         n, m = scenario.num_trackers, scenario.message_size
-        kept = 0 if perfect_radio(scenario) else n
+        kept = 0 if scenario.perfect_radio else n
         delay = scenario.radio_delay + 1
         tracker = np.zeros((num_worlds, n), TRACKER)
         tracker["max_speed"], tracker["max_turn_rate"] = scenario.tracker_speeds, scenario.tracker_turn_rates

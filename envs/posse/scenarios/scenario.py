@@ -344,6 +344,12 @@ class Scenario:
         return self.odometry_drift > 0 or self.heading_drift > 0
 
     @property
+    def perfect_radio(self) -> bool:
+        """Whether working trackers always receive each other's messages without delay."""
+        reliable = self.radio_delay == 0 and self.radio_loss == 0 and self.radio_outages == 0 and self.breaks == 0
+        return reliable and not self.drifts and math.isinf(self.radio_range)
+
+    @property
     def drift_bound(self) -> float:
         """Greatest error of a tracker's own position along an axis, m."""
         return 3 * self.odometry_drift * math.sqrt(self.control_step) * self.horizon

@@ -237,7 +237,7 @@ def observe_together(
         store(s.team_x[i], 0, pose.x)
         store(s.team_y[i], 0, pose.y)
     target = TargetPose(*columns(worlds.world, first, first + count, TARGET_POSE))
-    for i in range(n + 1 if c.target_agent != 0 else n):
+    for i in range(n + 1 if c.target_is_agent != 0 else n):
         observers = Observers(first, first + count, i, c.perfect_radio != 0 or i == n)
         view = view_of(c, worlds, observers, target)
         rows = observations[first : first + count, i]
