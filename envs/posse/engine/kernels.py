@@ -91,7 +91,7 @@ def reward(
     """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
         rewards[i] = made.reward(c, w, trackers[i], fixed.weights, terms[i])
-    if c.target_is_agent != 0:
+    if c.target_is_agent:
         n = c.num_trackers
         rewards[n] = made.target_reward(c, w, fixed.target_weights, terms[n])
 
@@ -145,14 +145,14 @@ def advance_worlds(
             for offset in range(0, observations.size * observations.itemsize, 64):  # bytes of a cache line
                 fetch(observations, offset)
         order = orders[e]
-        if order == STEP and w.over != 0:
+        if order == STEP and w.over:
             w.episode += 1
             order = START
         if order == STEP:
             apply_faults(c, w, trackers)
             motion(c, worlds, e, actions[e], made.set_goal, scratch)
             w.step += 1
-            if c.drifts != 0:
+            if c.drifts:
                 drift(c, w, worlds.odometry[e])
             if c.message_size > 0:
                 keep_messages(c, w, trackers, actions[e], worlds.message[e])
@@ -178,7 +178,7 @@ def advance_worlds(
         results.scores[e] = w.score
         results.terminated[e] = w.terminated != 0
         results.truncated[e] = w.over != 0 and w.terminated == 0
-        over += w.over != 0
+        over += w.over
         listen(c, w, trackers, scratch, observations, made.width)
     observe_together(c, worlds, first, count, made, scratch, results.observations)
     return over

@@ -102,14 +102,14 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     w.touching = target_touching
     w.onsets = w.contacts_target - before
     w.near = target_near
-    if c.target_is_agent != 0:
+    if c.target_is_agent:
         reach = c.robot_radius + TOUCHING_GAP
         w.in_contact = target_touching != NO_BITS or surroundings_within(c, obstacles, w.x, w.y, reach)
     if c.walled and not target_near:
         # A scripted target rarely comes so near: after trackers blocked it (steering.way_out), or if it
         # crosses its clearance within a control step.
         way = TOUCHING_GAP + c.target_speed * c.control_step
-        w.near = c.target_is_agent != 0 or surroundings_within(c, obstacles, w.x, w.y, c.robot_radius + way)
+        w.near = c.target_is_agent or surroundings_within(c, obstacles, w.x, w.y, c.robot_radius + way)
     w.least_gap = smallest
 
 

@@ -42,10 +42,10 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, w
     """Move the robots with something near in physics steps, the target first."""
     lay_out_robots(c, w, trackers, s)
     for _ in range(c.physics_steps):
-        if w.near != 0:
+        if w.near:
             move_swept(c, w, c.num_trackers, obstacles, s)
         for i, t in enumerate(trackers):
-            if t.near != 0 and t.broken_at == NEVER:
+            if t.near and t.broken_at == NEVER:
                 obey(c, t, wanted[i])
                 move_swept(c, t, i, obstacles, s)
 
@@ -89,7 +89,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
     wanted = actions
     if c.command_delay > 0:
         wanted = worlds.command[e, w.step % c.command_delay]  # in whose place the actions wait, below
-    if c.target_is_agent != 0:
+    if c.target_is_agent:
         action = actions[c.num_trackers]
         w.speed = HALF * (action[0] + ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate
@@ -97,13 +97,13 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
         w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, s)
         w.speed = c.target_speed
     parts, time = 1, c.control_step
-    if c.whole_arcs == 0:
+    if not c.whole_arcs:
         parts, time = int(c.physics_steps), c.physics_step
-    near = w.near != 0
+    near = bool(w.near)
     for _ in range(0 if near else parts):
         move_freely(w, time)
     for i, t in enumerate(trackers):
-        if t.near != 0:
+        if t.near:
             near = True
         elif t.broken_at == NEVER:
             for _ in range(parts):

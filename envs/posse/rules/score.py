@@ -28,7 +28,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
         # Until all slots taken are known, the distance to the nearest one of all.
         t.slot_progress = t.slot_distance
         t.slot_distance = s.slot_distance[i]
-        if s.slot_distance2[i] <= near2 and t.broken_at == NEVER and t.touching == 0:
+        if s.slot_distance2[i] <= near2 and t.broken_at == NEVER and not t.touching:
             best = int(s.slot[i])
             bit = BIT << np.uint64(best)
             if taken & bit == NO_BITS:

@@ -46,7 +46,7 @@ def is_clear(
 @compiled
 def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.float32 = _ROUNDING) -> bool:
     """Return whether a turning circle of a scripted target in an arena is free, but for an allowance, m."""
-    if not c.walled or c.target_is_agent != 0:
+    if not c.walled or c.target_is_agent:
         return True
     left, right = free_circles(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, allowance)
     return bool(left or right)
@@ -118,12 +118,12 @@ def begin(c: Record, worlds: WorldArrays, e: int) -> None:
     worlds.broadcast[e]["sent"][:] = 0
     worlds.command[e][:, :, 0] = -ONE
     worlds.command[e][:, :, 1] = ZERO
-    if c.drifts != 0:
+    if c.drifts:
         for i in range(c.num_trackers):
             o = worlds.odometry[e, i]
             o.x, o.y, o.heading, o.cos, o.sin = ZERO, ZERO, ZERO, ONE, ZERO
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
-    w.speed = c.target_speed if c.target_is_agent == 0 else ZERO
+    w.speed = ZERO if c.target_is_agent else c.target_speed
     w.turn_rate = ZERO
     w.frame_cos, w.frame_sin = w.heading_cos, w.heading_sin
     w.goal_cos, w.goal_sin = w.heading_cos, w.heading_sin

@@ -42,7 +42,7 @@ def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32
     count = 0
     for t in trackers:
         if t.broken_at == NEVER:
-            if t.could_arrive == 0:
+            if not t.could_arrive:
                 t.could_arrive = could_arrive(c, w, t, slots)
             count += t.could_arrive
     return np.float32(count) / np.float32(w.working) if w.working > 0 else ZERO

@@ -214,7 +214,7 @@ def _farthest_fix(s: Scenario) -> float:
 @field("m", -1, _farthest_fix, unknown=-1)
 def target_range(c: Record, v: View) -> Lanes:
     """Distance from the robot to the fix."""
-    if c.fix_bearing != 0:
+    if c.fix_bearing:
         return eight(-ONE)
     return choose(v.target_known, v.target_distance, -ONE)
 

@@ -150,7 +150,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
     if i < c.num_trackers:
         number = eight(np.float32(i))
         own = Pose(*columns(worlds.tracker[:, i], first, end, POSE))
-        if c.drifts != 0:  # its pose as it knows it
+        if c.drifts:  # its pose as it knows it
             error = Odometry(*columns(worlds.odometry[:, i], first, end, 0))
             cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
             x, y = own.x + error.x, own.y + error.y
@@ -167,7 +167,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         touching, sees, fixed_at = counts(target.in_contact), zero, number
         working = eight(ONE)
     dx, dy = fix.x, fix.y
-    if c.fix_bearing == 0:
+    if not c.fix_bearing:
         dx, dy = dx - own.x, dy - own.y
     return View(
         number=number,
@@ -237,7 +237,7 @@ def observe_together(
         store(s.team_x[i], 0, pose.x)
         store(s.team_y[i], 0, pose.y)
     target = TargetPose(*columns(worlds.world, first, first + count, TARGET_POSE))
-    for i in range(n + 1 if c.target_is_agent != 0 else n):
+    for i in range(n + c.target_is_agent):
         observers = Observers(first, first + count, i, c.perfect_radio != 0 or i == n)
         view = view_of(c, worlds, observers, target)
         rows = observations[first : first + count, i]

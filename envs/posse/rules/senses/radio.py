@@ -24,7 +24,7 @@ def radio_works(c: Record, w: Record, t: Record) -> bool:
 @compiled
 def share_fixes(c: Record, trackers: Records) -> None:
     """Perfect radio without faults: every tracker takes the newest fix."""
-    if c.fix_bearing != 0:
+    if c.fix_bearing:
         return
     best = trackers[0]
     for t in trackers:
@@ -56,7 +56,7 @@ def send(c: Record, worlds: WorldArrays, e: int) -> None:
         b.x, b.y, b.heading_cos, b.heading_sin = t.x, t.y, t.heading_cos, t.heading_sin
         b.speed, b.turn_rate = t.speed, t.turn_rate
         b.fix_step, b.fix = t.fix_step, t.fix
-        if c.drifts != 0:
+        if c.drifts:
             b.odometry = worlds.odometry[e, i]
 
 
@@ -75,7 +75,7 @@ def hear(c: Record, worlds: WorldArrays, e: int) -> None:
             continue
         for j in range(n):
             b = broadcast[slot, j]
-            if j == i or b.sent == 0:
+            if j == i or not b.sent:
                 continue
             dx, dy = b.x - t.x, b.y - t.y
             if dx * dx + dy * dy > reach2:
@@ -86,13 +86,13 @@ def hear(c: Record, worlds: WorldArrays, e: int) -> None:
             h = heard[i, j]
             h.step = sent_at
             h.x, h.y, h.heading_cos, h.heading_sin = b.x, b.y, b.heading_cos, b.heading_sin
-            if c.drifts != 0:
+            if c.drifts:
                 h.x, h.y = b.x + b.odometry.x, b.y + b.odometry.y
                 h.heading_cos, h.heading_sin = turned(b.heading_cos, b.heading_sin, b.odometry.cos, b.odometry.sin)
             h.speed, h.turn_rate = b.speed, b.turn_rate
             for k in range(c.message_size):
                 worlds.heard_message[e, i, j, k] = worlds.message[e, slot, j, k]
-            if b.fix_step > t.fix_step and c.fix_bearing == 0:
+            if b.fix_step > t.fix_step and not c.fix_bearing:
                 take_fix(c, t, b)
 
 

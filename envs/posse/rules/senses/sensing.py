@@ -28,7 +28,7 @@ def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s:
         return False
     if w.step >= t.sensor_dead_from and w.step < t.sensor_dead_from + c.outage_steps:
         return False
-    if c.all_round == 0:
+    if not c.all_round:
         along = dx * t.heading_cos + dy * t.heading_sin
         if along < c.view_cosine * np.float32(math.sqrt(d2)):
             return False
@@ -91,14 +91,14 @@ def look(c: Record, w: Record, trackers: Records, odometry: Records, sees: Any, 
         if not t.sees:
             continue
         seeing += 1
-        if c.measured != 0:
+        if c.measured:
             dx, dy = measure(c, w, i, dx, dy)
         own_x, own_y, cosine, sine = t.x, t.y, ONE, ZERO
-        if c.drifts != 0:  # what it measures is placed by its own pose, as it knows that
+        if c.drifts:  # what it measures is placed by its own pose, as it knows that
             own_x, own_y = t.x + odometry[i].x, t.y + odometry[i].y
             cosine, sine = odometry[i].cos, odometry[i].sin
             dx, dy = turned(dx, dy, cosine, sine)
-        if c.fix_bearing != 0:
+        if c.fix_bearing:
             per_metre = ONE / max(root(dx * dx + dy * dy), TINY)
             t.fix.x, t.fix.y = dx * per_metre, dy * per_metre
             t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ZERO, ZERO, ZERO, ZERO
@@ -107,7 +107,7 @@ def look(c: Record, w: Record, trackers: Records, odometry: Records, sees: Any, 
             t.fix.vx, t.fix.vy = fix_velocity(c, t, w.step, x, y)
             t.fix.x, t.fix.y, t.fix.cos, t.fix.sin = x, y, w.heading_cos, w.heading_sin
             t.fix.frame_cos, t.fix.frame_sin = w.frame_cos, w.frame_sin
-            if c.drifts != 0 or c.heading_noise > ZERO:
+            if c.drifts or c.heading_noise > ZERO:
                 noise = c.heading_noise * normal_pair(w.key, w.step, HEADING_NOISE, i)[0]
                 cosine, sine = turned(cosine, sine, np.float32(math.cos(noise)), np.float32(math.sin(noise)))
                 t.fix.cos, t.fix.sin = turned(t.fix.cos, t.fix.sin, cosine, sine)

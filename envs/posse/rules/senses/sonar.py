@@ -89,5 +89,5 @@ def listen(c: Record, w: Record, trackers: Records, s: Record, observations: Flo
     n = c.num_trackers
     for i in range(n):
         ping(c, trackers[i], i, s, observations[i], first)
-    if c.target_is_agent != 0:
+    if c.target_is_agent:
         ping(c, w, n, s, observations[n], first)
