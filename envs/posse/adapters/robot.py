@@ -113,7 +113,7 @@ class Robot:
 
     def reset(self) -> None:
         """Forget everything: the next observation is the first of an episode."""
-        self._world._execute(np.ones(1, np.bool_), START)  # no reset: where the robots are drawn plays no part
+        self._world._execute(START)  # no reset: where the robots are drawn plays no part
         self._world._started = True
         arrays = self._world.arrays
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0

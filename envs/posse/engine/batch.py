@@ -181,7 +181,7 @@ class Batch(OwnArrays):
     def observe(self) -> FloatArray:
         """Return the current observations of the worlds, (E, rows, F); ResetNeeded before the first :meth:`reset`."""
         self.check_started("observe")
-        return self._execute(np.zeros(self.num_worlds, np.bool_), LOOK)
+        return self._execute(LOOK)
 
     def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: "Batch | None" = None) -> "Batch":
         """Return ``count`` copies of the current state of every world, for planning ahead.
@@ -264,11 +264,11 @@ class Batch(OwnArrays):
         else:
             world["episode"][chosen] += 1
         try:
-            observations = self._execute(chosen, START)
+            observations = self._execute(START, chosen)
             check_drawn(self.scenario, world, chosen, poses)
             if poses:
                 self._place(poses, chosen)
-                observations = self._execute(chosen, START_FROM_POSES)
+                observations = self._execute(START_FROM_POSES, chosen)
         except BaseException:
             self.arrays.write(before)
             if self._started:
@@ -299,12 +299,12 @@ class Batch(OwnArrays):
             "left or right turning circle must be clear of obstacles and walls: move it or turn it"
         )
 
-    def _execute(self, chosen: BoolArray, order: int) -> FloatArray:
-        """Execute an order in the chosen worlds; return every world's observations."""
-        results = self._new_results()
-        actions = np.zeros(self.action_shape, np.float32)  # not read
-        self._advance(actions, results, np.where(chosen, order, LOOK).astype(np.uint8))
-        self._kernel = direct(self._kernel)  # now compiled
+    def _execute(self, order: int, chosen: BoolArray | slice = slice(None)) -> FloatArray:
+        """Execute an order other than STEP in the chosen worlds; return every world's observations."""
+        results, orders = self._new_results(), np.full(self.num_worlds, LOOK, np.uint8)
+        orders[chosen] = order
+        self._advance(np.zeros(self.action_shape, np.float32), results, orders)  # actions are not read
+        self._kernel = direct(self._kernel)  # which this call has compiled
         if not self._started:
             self.layout.check_added(results.observations)
         return results.observations
@@ -346,7 +346,7 @@ class Batch(OwnArrays):
             infos["final_obs"] = observations
             if over:
                 self.arrays.world["episode"][ended] += 1
-                observations, begun = self._execute(ended, START), True
+                observations, begun = self._execute(START, ended), True
         if begun:
             try:
                 check_drawn(self.scenario, self.arrays.world, self.arrays.world["step"] == 0)
