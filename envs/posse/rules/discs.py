@@ -17,7 +17,6 @@ TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
 FAR: Final = np.float32(1e9)
-_MINUS_ONE: Final = np.float32(-1.0)
 
 
 @compiled
@@ -103,7 +102,7 @@ def num_discs(c: Record) -> int:
 @compiled
 def within_one(value: Lanes) -> Lanes:
     """Return a cosine or sine, clipped to [-1, 1] against rounding."""
-    return lesser(greater(value, _MINUS_ONE), ONE)
+    return lesser(greater(value, -ONE), ONE)
 
 
 @compiled
@@ -145,7 +144,7 @@ def find_slots(c: Record, w: Record, slots: Records, taken: np.uint64, s: Record
     for block in range(blocks(c.num_trackers)):
         i = WIDTH * block
         ahead, left = in_frame(load(s.x, i) - w.x, load(s.y, i) - w.y, w.frame_cos, w.frame_sin)
-        nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
+        nearest, nearest2 = eight(-ONE), eight(FAR)
         for slot in range(c.num_trackers):
             if taken & (BIT << np.uint64(slot)) == NO_BITS:
                 dx, dy = ahead - slots[slot].x, left - slots[slot].y

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import ONE, Record, Records, compiled
+from posse.numeric import ONE, ZERO, Record, Records, compiled
 from posse.rules.randomness import FAULTS, bits, uniform
 from posse.rules.state import NEVER
 
@@ -71,7 +71,7 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
 def break_tracker(w: Record, t: Record) -> None:
     """Break one tracker permanently."""
     t.broken_at = w.step
-    t.speed, t.turn_rate = np.float32(0.0), np.float32(0.0)
+    t.speed, t.turn_rate = ZERO, ZERO
     w.working -= 1
     if w.lost_at < 0:
         w.lost_at = w.step
