@@ -17,7 +17,7 @@ from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
 from posse.rules.state import BROADCAST
 from posse.scenarios import Scenario, ScenarioError, get_scenario
-from posse.scenarios.scenario import FAR
+from posse.scenarios.scenario import UNLIMITED
 from posse.scenarios.setting import check_count
 from posse.signals.layout import ObservationLayout
 
@@ -302,6 +302,6 @@ def _check_age(age: float) -> None:
 
 def _finite(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
     array = real_numbers(name, values).astype(np.float64)
-    if array.shape != shape or not (np.abs(array) < FAR).all():  # also of nan
-        raise ValueError(f"{name}={values!r} must be {shape[0]} numbers between -{FAR:g} and {FAR:g}")
+    if array.shape != shape or not (np.abs(array) < UNLIMITED).all():  # also of nan
+        raise ValueError(f"{name}={values!r} must be {shape[0]} numbers between -{UNLIMITED:g} and {UNLIMITED:g}")
     return array

@@ -17,6 +17,7 @@ TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
 FAR: Final = np.float32(1e9)
+"""Coordinate of padding and distance of what is not there, m: farther than any robot or range."""
 
 
 @compiled

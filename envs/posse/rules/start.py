@@ -15,12 +15,11 @@ from posse.rules.discs import obstacle_within, surroundings_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
 from posse.rules.state import WorldArrays
-from posse.rules.targets.steering import free_circles
+from posse.rules.targets.steering import ROUNDING, free_circles
 from posse.scenarios import Scenario, ScenarioError
 
 _TRIES: Final = 2000
 _CLEARANCE: Final = np.float32(0.2)  # m, least between robots, and between a robot and an obstacle
-_ROUNDING: Final = np.float32(1e-3)  # m; a given pose is rounded to float32
 _OBSTACLES: Final = 1
 _TARGET: Final = 2
 _TRACKERS: Final = 4
@@ -44,7 +43,7 @@ def is_clear(
 
 
 @compiled
-def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.float32 = _ROUNDING) -> bool:
+def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.float32 = ROUNDING) -> bool:
     """Return whether a turning circle of a scripted target in an arena is free, but for an allowance, m."""
     if not c.walled or c.target_is_agent:
         return True

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from posse.declarations import SENSORS, TARGET_MOTIONS, Declarations
 from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
-from posse.scenarios.scenario import FAR, FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN
+from posse.scenarios.scenario import FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN, UNLIMITED
 
 BIT: Final = np.uint64(1)
 NO_BITS: Final = np.uint64(0)
@@ -78,15 +78,15 @@ DERIVED: Final[_Numbers] = {
     "heading_step": (_F, lambda s: s.heading_drift * math.sqrt(s.control_step)),
     "followed": (_F, lambda s: _share(s.physics_step, s.actuator_lag)),
     "fastest": (_F, lambda s: max(s.tracker_speeds)),
-    "speed_change": (_F, lambda s: min(s.tracker_acceleration * np.float32(s.physics_step), FAR)),
-    "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * np.float32(s.physics_step), FAR)),
+    "speed_change": (_F, lambda s: s.tracker_acceleration * np.float32(s.physics_step)),
+    "turn_change": (_F, lambda s: s.tracker_turn_acceleration * np.float32(s.physics_step)),
     "per_acceleration": (_F, lambda s: 1 / s.tracker_acceleration),  # 0: no limit
     "per_turn_acceleration": (_F, lambda s: 1 / s.tracker_turn_acceleration),
     "frame_c": (_F, lambda s: math.cos(_frame_turn(s))),
     "frame_s": (_F, lambda s: math.sin(_frame_turn(s))),
     "slots_reach": (_F, lambda s: max(math.hypot(*slot) for slot in s.slot_offsets)),
-    "half_width": (_F, lambda s: min(s.half_sides[0], FAR)),
-    "half_height": (_F, lambda s: min(s.half_sides[1], FAR)),
+    "half_width": (_F, lambda s: s.half_sides[0]),
+    "half_height": (_F, lambda s: s.half_sides[1]),
     "target_extent_x": (_F, lambda s: s.target_extent[0]),
     "target_extent_y": (_F, lambda s: s.target_extent[1]),
     "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
@@ -115,8 +115,10 @@ def _of_settings() -> _Numbers:
 _NUMBERS: Final = {**_of_settings(), **DERIVED}
 
 CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _NUMBERS.items()))
-"""The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
-``_most``), then :data:`DERIVED`."""
+"""The scenario, for kernels: its numbers by the names of its settings, then :data:`DERIVED`.
+
+``inf`` is ``UNLIMITED``; a pair is ``_least`` and ``_most``.
+"""
 
 # Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
 
@@ -386,7 +388,7 @@ def config_record(scenario: Scenario) -> Records:
     config = np.zeros(1, CONFIG)
     for name, (_, read) in _NUMBERS.items():
         value = read(scenario)
-        config[name] = FAR if value == math.inf else value
+        config[name] = UNLIMITED if value == math.inf else value
     return config
 
 

@@ -54,7 +54,7 @@ SLACK: Final = 1.001
 # Beyond these, increments and squares would be lost to rounding.
 SMALL: Final = 1e-3
 WIDE: Final = 1e4
-FAR: Final = 1.0e6
+UNLIMITED: Final = 1.0e6
 """Value of an unlimited range in the kernels, far beyond any distance of robots, m."""
 FARTHEST: Final = 500.0
 """Greatest coordinate of a robot, m: the spacing of float32 there, 3e-5 m, keeps contact exact to 1e-4 m."""
@@ -90,10 +90,10 @@ class Scenario:
         2.0, "greatest turn rate of a tracker, or of each", "rad/s", SMALL, WIDE
     )
     tracker_acceleration: float = setting(
-        math.inf, "greatest change of a tracker's speed; inf: no limit", "m/s²", SMALL, FAR, infinite=True
+        math.inf, "greatest change of a tracker's speed; inf: no limit", "m/s²", SMALL, UNLIMITED, infinite=True
     )
     tracker_turn_acceleration: float = setting(
-        math.inf, "greatest change of a tracker's turn rate; inf: no limit", "rad/s²", SMALL, FAR, infinite=True
+        math.inf, "greatest change of a tracker's turn rate; inf: no limit", "rad/s²", SMALL, UNLIMITED, infinite=True
     )
     actuator_lag: float = setting(
         0.0, "time constant with which a tracker's speed and turn rate follow the command; 0: at once", "s", 0, 100

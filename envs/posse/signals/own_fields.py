@@ -14,7 +14,7 @@ from posse.declarations import field
 from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
-from posse.scenarios.scenario import FAR, FORMATIONS, SLACK
+from posse.scenarios.scenario import FORMATIONS, SLACK, UNLIMITED
 from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
@@ -44,7 +44,7 @@ def setting(name: str) -> None:
     declared = Scenario.settings()[name]
 
     def limited(c: Record) -> np.float32:
-        return np.float32(c[name] if c[name] < FAR else -1.0)
+        return np.float32(c[name] if c[name] < UNLIMITED else -1.0)
 
     def low(s: Scenario) -> float:
         return -1.0 if math.isinf(getattr(s, name)) else 0.0

@@ -15,7 +15,7 @@ from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled
 from posse.rules.discs import surroundings_within, to_wall
 from posse.rules.kinematics import arc, turn_towards
 
-_ROUNDING: Final = np.float32(1e-3)  # m, far more than the accumulated rounding of an episode
+ROUNDING: Final = np.float32(1e-3)  # m, far more than that of a given pose, or accumulated in an episode
 _SOFT_WALL: Final = np.float32(2.0)  # m; distance to a wall at which goals are mirrored
 
 
@@ -76,7 +76,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
     if left or right:
         return turn
     # Allow for rounding, so that the target does not change sides on a free circle.
-    left, right = free_circles(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ROUNDING)
+    left, right = free_circles(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ROUNDING)
     if left and (turn >= ZERO or not right):
         side = ONE
     elif right:
