@@ -179,7 +179,7 @@ def advance_worlds(
         results.terminated[e] = w.terminated != 0
         results.truncated[e] = w.over != 0 and w.terminated == 0
         over += w.over
-        listen(c, w, trackers, scratch, observations, made.width)
+        listen(c, w, trackers, scratch, observations, made.own_size)
     observe_together(c, worlds, first, count, made, scratch, results.observations)
     return over
 

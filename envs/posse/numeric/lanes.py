@@ -190,7 +190,7 @@ def least(value: Lanes) -> np.float32:
 
 
 @_emits(lambda b, value: b.sitofp(b.bitcast(value, _INTEGERS), _FLOATS), _LANES, _LANES)
-def counts(value: Lanes) -> Lanes:
+def from_int(value: Lanes) -> Lanes:
     """Return int32 values, loaded from a record as raw bits, converted to float32."""
     return np.asarray(value, np.float32).view(np.int32).astype(np.float32)
 

@@ -114,7 +114,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
 
 
 @compiled
-def ones(mask: np.uint64) -> int:
+def count_bits(mask: np.uint64) -> int:
     """Return the number of bits that are set."""
     count = 0
     while mask != NO_BITS:
@@ -142,8 +142,8 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         found |= bits((x * x + y * y <= touch * touch) & other) << j
     touching = np.uint64(found) & ~bit
     begun = touching & ~t.touching_trackers
-    t.onsets += ones(begun)
-    w.contacts_tracker += ones(begun >> np.uint64(i))  # each pair once
+    t.onsets += count_bits(begun)
+    w.contacts_tracker += count_bits(begun >> np.uint64(i))  # each pair once
     t.touching_trackers = touching
     # Obstacles and walls.
     touching = NO_BITS
@@ -155,7 +155,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
             if along >= (c.half_width if k < 2 else c.half_height) - c.robot_radius - TOUCHING_GAP:
                 touching |= BIT << np.uint64(_FIRST_WALL + k)
-    begun = ones(touching & ~t.touching_obstacles)
+    begun = count_bits(touching & ~t.touching_obstacles)
     t.onsets += begun
     w.contacts_obstacle += begun
     t.touching_obstacles = touching

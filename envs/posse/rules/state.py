@@ -420,8 +420,8 @@ SCRATCH: Final = record_type(
     # Observations: eight numbers, one for each of eight worlds.
     ("team_x", _F, (TEAM, WIDTH)),  # of each tracker
     ("team_y", _F, (TEAM, WIDTH)),
-    ("placed", _F, (TEAM, WIDTH)),  # number of the team-mate in each place; -1: none
-    ("placed_at", _F, (TEAM, WIDTH)),  # its distance, m
+    ("mate_number", _F, (TEAM, WIDTH)),  # of the team-mate in each place; -1: none
+    ("mate_distance", _F, (TEAM, WIDTH)),  # m
 )
 """Scratch memory of a thread."""
 

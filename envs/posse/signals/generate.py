@@ -93,8 +93,8 @@ class _Module:
             "add_to_sums(c, w, trackers, slots)": self._sums(summed),
         }
         body = [
-            f"width = {_size(own)}",
-            f"mate_width = {_size(of_mate)}",
+            f"own_size = {_size(own)}",
+            f"mate_size = {_size(of_mate)}",
             *("\n    ".join([f"\n\n@compiled\ndef {head}:", *lines]) for head, lines in functions.items()),
         ]
         declared = (f"# {name}: {place_of(function)}" for name, function in self.functions.items())
@@ -109,8 +109,8 @@ class _Module:
 
     def _columns(self, fields: Iterable[field]) -> Iterator[str]:
         columns: list[str] = []
-        width = _size(fields)
-        blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]  # the last one repeats columns of the one before
+        size = _size(fields)
+        blocks = [*range(0, size - WIDTH, WIDTH), size - WIDTH]  # the last one repeats columns of the one before
         for each in fields:
             mine = [f"column_{each.name}_{q}" for q in range(each.size)]
             yield f"{', '.join(mine)} = {self._call(f'field_{each.name}', each.function)}"

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, compiled
-from posse.numeric.lanes import bits, choose, counts, eight, greater, lesser, load, load_fields, root, store, transpose
+from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, choose, compiled
+from posse.numeric.lanes import bits, eight, from_int, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (
@@ -157,14 +157,14 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
             own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
         fix = Fix(*columns(worlds.tracker[:, i], first, end, FIX))
         condition = Condition(*columns(worlds.tracker[:, i], first, end, CONDITION))
-        touching, sees, fixed_at = counts(condition.touching), counts(condition.sees), counts(condition.fix_step)
-        working = choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
+        touching, sees, fixed_at = from_int(condition.touching), from_int(condition.sees), from_int(condition.fix_step)
+        working = choose(from_int(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
     else:  # a target agent: its limits act at once, and it has no target
         zero, number = eight(ZERO), eight(-ONE)
         x, y, cos, sin, speed, turn_rate, _, _ = target
         own = Pose(x, y, cos, sin, speed, turn_rate, eight(c.target_speed), eight(c.target_turn_rate))
         fix = Fix(zero, zero, zero, zero, zero, zero, zero, zero)
-        touching, sees, fixed_at = counts(target.in_contact), zero, number
+        touching, sees, fixed_at = from_int(target.in_contact), zero, number
         working = eight(ONE)
     dx, dy = fix.x, fix.y
     if not c.fix_bearing:
@@ -179,7 +179,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         turn_rate=own.turn_rate,
         touching=touching,
         working=working,
-        step=counts(target.step),
+        step=from_int(target.step),
         max_speed=own.max_speed,
         max_turn_rate=own.max_turn_rate,
         target_known=fixed_at >= ZERO,
@@ -220,9 +220,9 @@ class Generated(NamedTuple):
     """Sets the sums of the metrics to zero."""
     add_to_sums: Any
     """Adds a control step to the sums of the metrics."""
-    width: int
+    own_size: int
     """Length of the observation before the sonar."""
-    mate_width: int
+    mate_size: int
     """Length of a team-mate's part, without its message."""
 
 
@@ -243,23 +243,23 @@ def observe_together(
         rows = observations[first : first + count, i]
         made.write_own(c, view, rows)
         _list_nearest(c, worlds, observers, view, s)
-        start, size = made.width + c.sonar_beams, made.mate_width + c.message_size
+        start, size = made.own_size + c.sonar_beams, made.mate_size + c.message_size
         for p in range(c.neighbours):
             mate = _mate_in_place(c, worlds, observers, view, p, s)
             place = rows[:, start + p * size :]
             made.write_mate(c, view, mate, place)
             if c.message_size > 0:
-                _write_messages(c, worlds, observers, p, s, place[:, made.mate_width :])
+                _write_messages(c, worlds, observers, p, s, place[:, made.mate_size :])
 
 
 @compiled
 def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
     first, end, i, now = observers
-    n, places, placed, placed_at = c.num_trackers, c.neighbours, s.placed, s.placed_at
+    n, places, mate_number, mate_distance = c.num_trackers, c.neighbours, s.mate_number, s.mate_distance
     for p in range(places):
-        store(placed[p], 0, eight(-ONE))
-        store(placed_at[p], 0, eight(FAR))
+        store(mate_number[p], 0, eight(-ONE))
+        store(mate_distance[p], 0, eight(FAR))
     if places == 0:
         return
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
@@ -269,18 +269,18 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
             x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
             heard = Heard(*columns(worlds.heard[:, i, j], first, end, MESSAGE))
-            x, y, sent = heard.x, heard.y, counts(heard.step)
+            x, y, sent = heard.x, heard.y, from_int(heard.step)
             known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
         ahead, left = ego(v, x - v.x, y - v.y)
         number = choose(known, np.float32(j), -ONE)
         distance = choose(known, root(ahead * ahead + left * left), FAR)
-        if bits(distance <= load(placed_at[places - 1], 0)) == 0:
+        if bits(distance <= load(mate_distance[places - 1], 0)) == 0:
             continue
         for p in range(min(n - j, places)):
-            other, whose = load(placed_at[p], 0), load(placed[p], 0)
+            other, whose = load(mate_distance[p], 0), load(mate_number[p], 0)
             nearer = distance <= other
-            store(placed[p], 0, choose(nearer, number, whose))
-            store(placed_at[p], 0, lesser(other, distance))
+            store(mate_number[p], 0, choose(nearer, number, whose))
+            store(mate_distance[p], 0, lesser(other, distance))
             number, distance = choose(nearer, whose, number), greater(other, distance)
 
 
@@ -298,12 +298,12 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
         _fields_of(worlds, observers, p, 7, s),
     )
     x, y, cos, sin, speed, turn_rate, sent, _ = transpose(rows)
-    age = eight(ZERO) if observers.now else (v.step - counts(sent)) * c.control_step
-    distance, dx, dy = load(s.placed_at[p], 0), x - v.x, y - v.y
+    age = eight(ZERO) if observers.now else (v.step - from_int(sent)) * c.control_step
+    distance, dx, dy = load(s.mate_distance[p], 0), x - v.x, y - v.y
     ahead, left = ego(v, dx, dy)
     apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
     return Mate(
-        number=load(s.placed[p], 0),
+        number=load(s.mate_number[p], 0),
         age=age,
         dx=dx,
         dy=dy,
@@ -321,7 +321,7 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
 def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: Record) -> Lanes:
     """Return eight fields of a lane's mate in a place, of :class:`Pose` or of :class:`Heard`, which begins alike."""
     e = min(observers.first + lane, observers.end - 1)
-    j = max(int(s.placed[p, lane]), 0)
+    j = max(int(s.mate_number[p, lane]), 0)
     if observers.now:
         return load_fields(worlds.tracker[e, j], POSE)
     return load_fields(worlds.heard[e, observers.i, j], MESSAGE)
@@ -333,7 +333,7 @@ def _write_messages(c: Record, worlds: WorldArrays, observers: Observers, p: int
     first, end, i, now = observers
     for e in range(first, end):
         lane = e - first
-        number = int(s.placed[p, lane])
+        number = int(s.mate_number[p, lane])
         for q in range(c.message_size):
             said = ZERO
             if number >= 0 and i < c.num_trackers:
