@@ -432,7 +432,7 @@ class sensor(Declaration):  # noqa: N801
     The function takes the scenario, the world, the tracker, the vector (dx, dy) to the target in
     the common frame, and scratch memory with the obstacles' positions, and returns whether the
     target is in sight. The built-in one is :func:`posse.rules.senses.in_sight`. The result is a
-    *fix* (:data:`posse.rules.state.FIX_RECORD`), of one of these kinds:
+    *fix* (:data:`posse.rules.state.FIX`), of one of these kinds:
 
     ============ ======================================================================================
     ``position`` position and heading of the target, slot frame; velocity from successive fixes

@@ -117,7 +117,7 @@ LOOK: Final = 3
 @compiled
 def advance_worlds(
     first: int,
-    count: int,
+    end: int,
     fixed: Fixed,
     orders: Orders,
     actions: FloatArray,
@@ -125,7 +125,7 @@ def advance_worlds(
     made: Generated,
     scratch: Record,
 ) -> int:
-    """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
+    """Execute the orders of the worlds ``first`` to ``end``, at most WIDTH; return how many are over.
 
     ================== =============================================================================
     STEP               a control step, or the start of the next episode if this one is over
@@ -134,13 +134,13 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most WIDTH. Control steps alone read ``actions`` (E, rows, 2 + m).
+    Control steps alone read ``actions`` (E, rows, 2 + m).
     """
     worlds, c, over = fixed.worlds, fixed.config[0], 0
-    for e in range(first, first + count):
+    for e in range(first, end):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
-        if count > 1 and trackers.shape[0] <= 16:  # larger teams' would not fit in the first-level cache
+        if end - first > 1 and trackers.shape[0] <= 16:  # larger teams' would not fit in the first-level cache
             # Written below, after the loop; without prefetching 16,384 worlds take a third longer.
             for offset in range(0, observations.size * observations.itemsize, 64):  # bytes of a cache line
                 fetch(observations, offset)
@@ -180,7 +180,7 @@ def advance_worlds(
         results.truncated[e] = w.over != 0 and w.terminated == 0
         over += w.over
         listen(c, w, trackers, scratch, observations, made.own_size)
-    observe_together(c, worlds, first, count, made, scratch, results.observations)
+    observe_together(c, worlds, first, end, made, scratch, results.observations)
     return over
 
 
@@ -214,7 +214,7 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     ) -> int:
         scratch, over = fixed.scratch[thread], 0
         for e in range(first, end, WIDTH):
-            over += advance_worlds(e, min(WIDTH, end - e), fixed, orders, actions, results, made, scratch)
+            over += advance_worlds(e, min(e + WIDTH, end), fixed, orders, actions, results, made, scratch)
         return over
 
     return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn

@@ -11,7 +11,7 @@ import numpy as np
 from posse.numeric import ONE, WIDTH, Lanes, Record, Records, choose, compiled, eight, greater, lesser, root
 from posse.numeric.lanes import load, load_fields, store, transpose
 from posse.rules.kinematics import in_frame
-from posse.rules.state import BIT, NO_BITS, POSE, Pose
+from posse.rules.state import BIT, NO_BITS, POSE_AT, Pose
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -49,13 +49,13 @@ def surroundings_within(c: Record, obstacles: Records, x: np.float32, y: np.floa
 
 
 @compiled
-def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lanes, ...]:
-    """Return a block of eight fields of eight of ``count`` records, field by field.
+def columns(records: Records, first: int, end: int, offset: int) -> tuple[Lanes, ...]:
+    """Return a block of eight fields of eight records, field by field, of which a named tuple is made.
 
-    From record ``first`` on; beyond the end, the last record is repeated. ``offset`` is where the
-    block begins, such as :data:`posse.rules.state.POSE`, whose named tuple is made of the result.
+    The records are those from ``first`` on; from ``end`` on, the one before is repeated. ``offset`` is where the block
+    begins, such as :data:`posse.rules.state.POSE_AT` for a :class:`posse.rules.state.Pose`.
     """
-    last = count - 1
+    last = end - 1
     rows = (
         load_fields(records[min(first, last)], offset),
         load_fields(records[min(first + 1, last)], offset),
@@ -75,7 +75,7 @@ def lay_out_robots(c: Record, w: Record, trackers: Records, s: Record) -> None:
     n = c.num_trackers
     for block in range(blocks(n + 1)):
         j = WIDTH * block
-        pose = Pose(*columns(trackers, j, n, POSE))
+        pose = Pose(*columns(trackers, j, n, POSE_AT))
         number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))

@@ -253,7 +253,7 @@ def world_record(declared: Declarations) -> np.dtype[Any]:
     return record_type(*_WORLD, *reversed(memories.items()), *reversed(sums.items()))
 
 
-FIX_RECORD: Final = record_type(*((name, _F) for name in Fix._fields))
+FIX: Final = record_type(*((name, _F) for name in Fix._fields))
 """A fix of the target: a position or a bearing, depending on the sensor (:func:`posse.sensor`)."""
 
 TRACKER: Final = record_type(
@@ -264,7 +264,7 @@ TRACKER: Final = record_type(
     ("could_arrive", _I),  # 1: on a straight line at full speed it could have reached a slot
     ("touching_trackers", _U),
     ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
-    ("fix", FIX_RECORD),  # its best fix of the target, from its sensor or by radio
+    ("fix", FIX),  # its best fix of the target, from its sensor or by radio
     # inputs of score and rewards, with slot and could_arrive
     ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
     ("slot_progress", _F),  # decrease of slot_distance in this step
@@ -289,22 +289,23 @@ BROADCAST: Final = record_type(
     *((name, _F) for name in Pose._fields[:6]),
     ("fix_step", _I),
     ("odometry", ODOMETRY),  # a receiver is told the pose with this error
-    ("fix", FIX_RECORD),  # a receiver works out the velocity from its own previous fix
+    ("fix", FIX),  # a receiver works out the velocity from its own previous fix
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
 
 def _begin(record: np.dtype[Any], name: str) -> int:
-    """Return where a block of a record begins, bytes."""
     fields: Any = record.fields
     return int(fields[name][1])
 
 
-TARGET_POSE: Final = _begin(record_type(*_WORLD), TargetPose._fields[0])
-POSE: Final = _begin(TRACKER, Pose._fields[0])
-CONDITION: Final = _begin(TRACKER, Condition._fields[0])
-FIX: Final = _begin(TRACKER, "fix")
-MESSAGE: Final = _begin(HEARD, Heard._fields[0])
+TARGET_POSE_AT: Final = _begin(record_type(*_WORLD), TargetPose._fields[0])
+POSE_AT: Final = _begin(TRACKER, Pose._fields[0])
+CONDITION_AT: Final = _begin(TRACKER, Condition._fields[0])
+FIX_AT: Final = _begin(TRACKER, "fix")
+HEARD_AT: Final = _begin(HEARD, Heard._fields[0])
+ODOMETRY_AT: Final = _begin(ODOMETRY, Odometry._fields[0])
+"""Where the blocks begin in their records, bytes."""
 
 
 class WorldArrays(NamedTuple):

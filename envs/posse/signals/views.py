@@ -19,12 +19,13 @@ from posse.numeric.lanes import bits, eight, from_int, greater, lesser, load, lo
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (
-    CONDITION,
-    FIX,
-    MESSAGE,
+    CONDITION_AT,
+    FIX_AT,
+    HEARD_AT,
     NEVER,
-    POSE,
-    TARGET_POSE,
+    ODOMETRY_AT,
+    POSE_AT,
+    TARGET_POSE_AT,
     Condition,
     Fix,
     Heard,
@@ -149,14 +150,14 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
     first, end, i, _ = observers
     if i < c.num_trackers:
         number = eight(np.float32(i))
-        own = Pose(*columns(worlds.tracker[:, i], first, end, POSE))
+        own = Pose(*columns(worlds.tracker[:, i], first, end, POSE_AT))
         if c.drifts:  # its pose as it knows it
-            error = Odometry(*columns(worlds.odometry[:, i], first, end, 0))
+            error = Odometry(*columns(worlds.odometry[:, i], first, end, ODOMETRY_AT))
             cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
             x, y = own.x + error.x, own.y + error.y
             own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
-        fix = Fix(*columns(worlds.tracker[:, i], first, end, FIX))
-        condition = Condition(*columns(worlds.tracker[:, i], first, end, CONDITION))
+        fix = Fix(*columns(worlds.tracker[:, i], first, end, FIX_AT))
+        condition = Condition(*columns(worlds.tracker[:, i], first, end, CONDITION_AT))
         touching, sees, fixed_at = from_int(condition.touching), from_int(condition.sees), from_int(condition.fix_step)
         working = choose(from_int(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
     else:  # a target agent: its limits act at once, and it has no target
@@ -228,19 +229,19 @@ class Generated(NamedTuple):
 
 @compiled
 def observe_together(
-    c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
+    c: Record, worlds: WorldArrays, first: int, end: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
-    """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
+    """Write the observations of all agents of the worlds ``first`` to ``end``, at most eight, without the sonar."""
     n = c.num_trackers
     for i in range(n):
-        pose = Pose(*columns(worlds.tracker[:, i], first, first + count, POSE))
+        pose = Pose(*columns(worlds.tracker[:, i], first, end, POSE_AT))
         store(s.team_x[i], 0, pose.x)
         store(s.team_y[i], 0, pose.y)
-    target = TargetPose(*columns(worlds.world, first, first + count, TARGET_POSE))
+    target = TargetPose(*columns(worlds.world, first, end, TARGET_POSE_AT))
     for i in range(n + c.target_is_agent):
-        observers = Observers(first, first + count, i, c.perfect_radio != 0 or i == n)
+        observers = Observers(first, end, i, c.perfect_radio != 0 or i == n)
         view = view_of(c, worlds, observers, target)
-        rows = observations[first : first + count, i]
+        rows = observations[first:end, i]
         made.write_own(c, view, rows)
         _list_nearest(c, worlds, observers, view, s)
         start, size = made.own_size + c.sonar_beams, made.mate_size + c.message_size
@@ -268,7 +269,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
         if now:
             x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
-            heard = Heard(*columns(worlds.heard[:, i, j], first, end, MESSAGE))
+            heard = Heard(*columns(worlds.heard[:, i, j], first, end, HEARD_AT))
             x, y, sent = heard.x, heard.y, from_int(heard.step)
             known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
         ahead, left = ego(v, x - v.x, y - v.y)
@@ -323,8 +324,8 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: 
     e = min(observers.first + lane, observers.end - 1)
     j = max(int(s.mate_number[p, lane]), 0)
     if observers.now:
-        return load_fields(worlds.tracker[e, j], POSE)
-    return load_fields(worlds.heard[e, observers.i, j], MESSAGE)
+        return load_fields(worlds.tracker[e, j], POSE_AT)
+    return load_fields(worlds.heard[e, observers.i, j], HEARD_AT)
 
 
 @compiled
