@@ -72,20 +72,21 @@ class _Module:
             "target_reward(c, w, weights, values)": self._reward({f"target_term_{t.name}": t.of_target for t in terms}),
             "draw_motion(c, w)": [
                 *(f"w.{memory} = ZERO" for motion in motions for memory in motion.memory),
-                *self._chosen("motion", "{}", {f"draw_{each.name}": each.draw for each in motions}),
+                *self._chosen("motion", {f"draw_{each.name}": each.draw for each in motions}, "{}"),
             ],
             "set_goal(c, w, trackers, obstacles, s)": self._chosen(
-                "motion", "{}", {f"goal_{each.name}": each.function for each in motions}
+                "motion", {f"goal_{each.name}": each.function for each in motions}, "{}"
             ),
             "sees(c, w, t, dx, dy, s)": [
-                *self._chosen("sensor", "return bool({})", {f"sight_{each.name}": each.function for each in sensors}),
+                *self._chosen("sensor", {f"sight_{each.name}": each.function for each in sensors}, "return bool({})"),
                 "return False",
             ],
             "measure(c, w, number, dx, dy)": [
                 *self._chosen(
                     "sensor",
-                    "x, y = {}\n        return float32(x), float32(y)",
                     {f"measure_{each.name}": each.measure for each in sensors},
+                    "x, y = {}",
+                    "return float32(x), float32(y)",
                 ),
                 "return add_noise(c, w, number, dx, dy)",
             ],
@@ -132,11 +133,12 @@ class _Module:
         yield from (f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in reversed(range(len(terms))))
         yield "return reward"
 
-    def _chosen(self, setting: str, statement: str, functions: Mapping[str, Function | None]) -> Iterator[str]:
-        """Yield a statement with the call of one of several functions, by a number of the scenario."""
+    def _chosen(self, setting: str, functions: Mapping[str, Function | None], *statements: str) -> Iterator[str]:
+        """Yield statements with the call of one of several functions, by a number of the scenario."""
         for k, (name, function) in enumerate(functions.items()):
             if function is not None:
-                yield from (f"if c.{setting} == {k}:", f"    {statement.format(self._call(name, function))}")
+                call = self._call(name, function)
+                yield from (f"if c.{setting} == {k}:", *(f"    {each.format(call)}" for each in statements))
 
     def _sums(self, metrics: Iterable[metric]) -> Iterator[str]:
         loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += w.working"]
