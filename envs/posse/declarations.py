@@ -97,7 +97,6 @@ class Declaration:
         known: All of this kind.
         signatures: The attributes that are functions, each with the parameters that it may have, and what it returns.
             All but ``function`` may be ``None``.
-        choices: The values that other attributes may have.
         marks: What a name may hold beside letters and digits.
     """
 
@@ -107,7 +106,6 @@ class Declaration:
     kind: ClassVar[str]
     known: ClassVar[Registry[Any]]
     signatures: ClassVar[Mapping[str, tuple[str, str]]]
-    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     marks: ClassVar[str] = "_"  # generated source uses the name in Python's names
 
     def __post_init__(self) -> None:
@@ -143,9 +141,6 @@ class Declaration:
             raise self.error("its docstring, which must state its meaning, is missing")
         if not isinstance(unit, str) or not unit:
             raise self.error(f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
-        for attribute, choices in self.choices.items():
-            if getattr(self, attribute) not in choices:
-                raise self.error(f"unknown {attribute}={getattr(self, attribute)!r}; allowed: {', '.join(choices)}")
 
     def _checked(self, function: Any, allowed: str) -> Function:
         """Return a function, compiled if kernels call it; raise DeclarationError if it has other parameters."""
@@ -455,12 +450,16 @@ class sensor(Declaration):  # noqa: N801
         "function": ("(c, w, t, dx, dy) or (c, w, t, dx, dy, s)", "True or False"),
         "measure": ("(c, w, number, dx, dy)", "2 numbers"),
     }
-    choices: ClassVar = {"fix": ("position", "bearing")}
 
     name: str
     _: KW_ONLY
     measure: Function | None = None
     fix: str = "position"
+
+    def _check(self) -> None:
+        super()._check()
+        if self.fix not in ("position", "bearing"):
+            raise self.error(f"unknown fix={self.fix!r}; allowed: position, bearing")
 
 
 class Declarations(NamedTuple):
