@@ -120,7 +120,7 @@ class Robot:
         self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
         self._newest: dict[int, int] = {}  # step of each team-mate's last pose and, by the own number, of the last fix
-        self._said = self._told = (0.0,) * self.scenario.message_size
+        self._message = self._sent_message = (0.0,) * self.scenario.message_size
 
     @property
     def _me(self) -> Any:
@@ -167,7 +167,7 @@ class Robot:
         messages = [self._checked(message) for message in heard or ()]
         fix = None if target_fix is None else self._checked_fix(target_fix)
 
-        self.steps, self._told = self.steps + 1, self._said
+        self.steps, self._sent_message = self.steps + 1, self._message
         world, me = self._world.arrays.world[0], self._me
         world.step = self.steps
         self._pose = (x, y, heading)
@@ -177,7 +177,7 @@ class Robot:
             self._hear(message)
         if fix is not None:
             self._take(fix)
-        self._to_tell = self._best_fix()  # as a tracker, which sends before it hears
+        self._sent_fix = self._best_fix()  # as a tracker, which sends before it hears
         for each in messages:
             if each.fix is not None:
                 self._take(each.fix._replace(age=each.fix.age + each.age))
@@ -198,19 +198,19 @@ class Robot:
         numbers = _finite("action", action, (2 + self.scenario.message_size,))
         if np.abs(numbers).max() > MOST_ACTION:
             raise ValueError(f"action={action!r} must lie in [-1, 1]")
-        forward, turn, *said = np.clip(numbers, -1.0, 1.0).tolist()
-        self._said = tuple(said)
+        forward, turn, *message = np.clip(numbers, -1.0, 1.0).tolist()
+        self._message = tuple(message)
         s, turn_rate = self.scenario, turn * self.scenario.tracker_turn_rates[self.number]
         most = s.tracker_speeds[self.number]
         left = max(0.0, most - 0.5 * s.wheel_base * abs(turn_rate))  # by the turn, as in posse.rules.motion
-        return Command(min((forward + 1) / 2 * most, left) / self.scale, turn_rate, self._said)
+        return Command(min((forward + 1) / 2 * most, left) / self.scale, turn_rate, self._message)
 
     def broadcast(self) -> Heard:
         """Return what team-mates should hear of it now: its last measurements, and what its policy said before."""
         if self.steps < 0:
             raise ValueError("broadcast before the first observation: call observe() first")
         motion = float(self._me.speed) / self.scale, float(self._me.turn_rate)
-        return Heard(self.number, *self._pose, *motion, self._told, self._to_tell)
+        return Heard(self.number, *self._pose, *motion, self._sent_message, self._sent_fix)
 
     def _best_fix(self) -> TargetFix | None:
         me = self._me

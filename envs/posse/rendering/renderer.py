@@ -80,7 +80,7 @@ class Renderer:
                 f"{self.scenario.name!r}: their scenarios must be equal in every setting"
             )
         scene = Scene(batch, world)
-        self.camera.follow(scene.action, self._history.note(scene))
+        self.camera.follow(scene.in_view, self._history.note(scene))
         return scene
 
     def draw(

@@ -56,7 +56,7 @@ class Scene:
         self.obstacles = points("obstacle_x", "obstacle_y", "obstacle_radius")  # (M, 3)
 
     @property
-    def action(self) -> Points:
+    def in_view(self) -> Points:
         """Points (K, 2) that a camera keeps in view.
 
         Broken trackers stay behind: a view that included them would grow without bound.
