@@ -113,7 +113,7 @@ class BatchEnv:
 
 
 class WorldEnv(BatchEnv):
-    """An environment of one world, but for the interface of its library."""
+    """An environment of one world; a subclass adds the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         for name in ("num_worlds", "autoreset", "num_threads"):

@@ -39,7 +39,7 @@ Orders = npt.NDArray[np.uint8]
 
 
 class Fixed(NamedTuple):
-    """What a batch passes to its kernel every time."""
+    """The arguments of a kernel that stay the same for a batch."""
 
     config: Records
     """(1,) :data:`posse.rules.state.CONFIG`."""
@@ -172,7 +172,7 @@ def advance_worlds(
             reward(c, w, trackers, fixed, made, rewards, terms)
         else:
             if order != LOOK:
-                w.held, w.score = 0, ZERO
+                w.held, w.score = 0, ZERO  # a start is no step: what occupy() found does not count
             rewards[:] = ZERO
             terms[:, :] = ZERO
         results.scores[e] = w.score

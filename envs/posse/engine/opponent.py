@@ -142,8 +142,8 @@ def batch(
     ``settings`` are further arguments of :class:`Batch`, or any field of :class:`posse.Scenario`.
 
     With ``target_policy`` that policy moves the target of every world; observations, actions and rewards are those of
-    the trackers. With ``team_policy`` a policy moves the trackers, and they are those of the target, one row and
-    actions of two numbers. Both return a :class:`PairedBatch`; they exclude each other.
+    the trackers. With ``team_policy`` that policy moves the trackers; observations, actions and rewards are those of
+    the target: one row, and actions of two numbers. Both return a :class:`PairedBatch`; they exclude each other.
     """
     own = of_batch(settings)
     found = get_scenario(scenario, **settings)

@@ -73,7 +73,7 @@ def _digest(value: Any) -> bytes:
 
 
 class _Reached(pickle.Pickler):
-    """Writes functions with all that they reach, and classes by what compiled code sees of them; it is never read."""
+    """Writes what is hashed: functions with all that they reach, classes by what compiled code sees of them."""
 
     def reducer_override(self, value: Any) -> Any:
         function = getattr(value, "py_func", value)
@@ -107,7 +107,7 @@ def _parts_of(function: FunctionType) -> tuple[Any, ...]:
         codes += (inner for inner in each.co_consts if isinstance(inner, CodeType))
     names = {name for each in codes for name in (*each.co_names, *each.co_freevars)}
     found: list[Any] = [(name, scope[name]) for name in sorted(names & scope.keys())]
-    modules: set[ModuleType] = {numba, np}  # looked through
+    modules: set[ModuleType] = {numba, np}  # need not be looked through (again)
     for _, part in found:  # what is in modules is added as they are found
         if isinstance(part, ModuleType) and part not in modules and not part.__name__.startswith(("numba.", "numpy.")):
             modules.add(part)

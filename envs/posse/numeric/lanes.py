@@ -5,10 +5,10 @@ such as ``x * x + y * y`` is written as for single numbers and computes eight di
 float32 is broadcast to eight copies. Rounding is the same as for single numbers: a lane does not depend on its
 neighbours.
 
-Lanes support ``+ - * /``, ``abs`` and the comparisons ``< <= > >= ==``, which return masks; masks support ``&`` and
-``|``. All other operations are the functions below; ``choose``, ``lesser``, ``greater`` and ``root`` also accept single
-numbers, so that a formula is written only once. The body of a function works on numpy arrays and is used only if
-nothing is compiled; the decorators above it say what it compiles to.
+Lanes support ``+ - * /``, ``abs`` and the comparisons ``< <= > >= == !=``, which return masks; masks support ``&``
+and ``|``. All other operations are the functions below; ``choose``, ``lesser``, ``greater`` and ``root`` also accept
+single numbers, so that a formula is written only once. The body of a function works on numpy arrays and is used only
+if nothing is compiled; the decorators above it say what it compiles to.
 """
 
 import operator
@@ -67,7 +67,7 @@ def tuple_of_lanes(kind: type) -> types.NamedTuple:
 
 
 def _key(function: Callable[..., Any]) -> Any:
-    """Return the key of a function for numba, which would look for it in the module, where it is not yet."""
+    """Return a function's key for numba: of those below a text, since they are not in their module when decorated."""
     return f"{__name__}.{function.__name__}" if function.__module__ == __name__ else function
 
 

@@ -25,9 +25,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
     near2 = c.tolerance * c.tolerance
     for i, t in enumerate(trackers):
         t.slot = -1
-        # Until all slots taken are known, the distance to the nearest one of all.
-        t.slot_progress = t.slot_distance
-        t.slot_distance = s.slot_distance[i]
+        t.slot_progress = t.slot_distance  # of the step before; the new one is subtracted below
+        t.slot_distance = s.slot_distance[i]  # to the nearest slot, until all that are taken are known
         if s.slot_distance2[i] <= near2 and t.broken_at == NEVER and not t.touching:
             best = int(s.slot[i])
             bit = BIT << np.uint64(best)

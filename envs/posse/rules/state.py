@@ -76,7 +76,7 @@ DERIVED: Final[_Numbers] = {
     "whole_arcs": (_I, _whole_arcs),
     "position_step": (_F, lambda s: s.odometry_drift * math.sqrt(s.control_step)),
     "heading_step": (_F, lambda s: s.heading_drift * math.sqrt(s.control_step)),
-    "followed": (_F, lambda s: _share(s.physics_step, s.actuator_lag)),
+    "followed": (_F, lambda s: _share(s.physics_step, s.actuator_lag)),  # share of a command reached in a physics step
     "fastest": (_F, lambda s: max(s.tracker_speeds)),
     "speed_change": (_F, lambda s: s.tracker_acceleration * np.float32(s.physics_step)),
     "turn_change": (_F, lambda s: s.tracker_turn_acceleration * np.float32(s.physics_step)),
@@ -249,7 +249,7 @@ def world_record(declared: Declarations) -> np.dtype[Any]:
             if memory in {**dict(_WORLD), **sums, **memories}:
                 raise motion.error(f"a world has a field {memory!r}: choose another name for this memory")
             memories[memory] = _F
-    # Those of users before the built-in ones: numba warns of a record that another one begins with.
+    # Reversed, so that users' come before the built-in ones: numba warns if one record is the beginning of another.
     return record_type(*_WORLD, *reversed(memories.items()), *reversed(sums.items()))
 
 
@@ -412,7 +412,7 @@ SCRATCH: Final = record_type(
     ("reading", _F, BEAMS),  # m
     # Trackers.
     ("gap", _F, TEAM),  # clearance to the nearest disc, m
-    ("excess", _F, TEAM),  # above 0 only if nothing is near
+    ("excess", _F, TEAM),  # above 0 only if nothing is near; a sign alone, m² to robots and m to obstacles
     ("slot", _F, TEAM),  # number of the nearest slot, or of the nearest free one
     ("slot_distance", _F, TEAM),  # distance to it, m
     ("slot_distance2", _F, TEAM),  # squared, m²

@@ -122,7 +122,7 @@ class _Module:
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
             while blocks and len(columns) >= blocks[0] + WIDTH:
-                first = blocks.pop(0)  # as int64(), else numba would compile write_block for each
+                first = blocks.pop(0)  # written as int64(...), else numba would compile write_block for each number
                 yield f"write_block(({', '.join(columns[first : first + WIDTH])}), int64({first}), rows)"
 
     def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:
