@@ -74,17 +74,18 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         observations, rewards, terminated, truncated, infos = self.batch.step(motions.reshape(self.batch.action_shape))
         if self.render_mode == "human":
             self._draw()
-        last, ended, infos, more = infos.pop("final_obs", None), terminated | truncated, self._own(infos), {}
-        if last is not None and ended.any():
-            final = np.full(self.num_envs, None, dtype=object)
+        last, final = infos.pop("final_obs", None), {}
+        infos, ended = self._own(infos), terminated | truncated
+        if last is not None and ended.any():  # new episodes have begun at once
+            rows = np.full(self.num_envs, None, dtype=object)
             for e in np.flatnonzero(ended):
-                final[e] = last[e, self._rows].copy()
+                rows[e] = last[e, self._rows].copy()
             infos_then = _with_masks(_zeroed(infos, ended), ended)
-            more = _with_masks({"final_obs": final, "final_info": infos_then}, ended)
+            final = _with_masks({"final_obs": rows, "final_info": infos_then}, ended)
             infos = _zeroed(infos, ~ended)
             if "working" in infos:
                 infos["working"] = self.batch.working[:, self._rows]
-        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | more
+        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | final
         own = rewards.mean(axis=1, dtype=np.float64)
         return observations[:, self._rows], own, terminated, truncated, infos
 

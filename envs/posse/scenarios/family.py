@@ -142,9 +142,10 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
         else:
             ranges.pop(setting, None)
             rest[setting] = value
-    scenario, items = get_scenario(base.base if isinstance(base, Family) else base, **rest), tuple(ranges.items())
+    items = tuple(ranges.items())
     if isinstance(base, Family):
-        return dataclasses.replace(base, name=name or base.name, base=scenario, ranges=items)
+        return dataclasses.replace(base, name=name or base.name, base=get_scenario(base.base, **rest), ranges=items)
+    scenario = get_scenario(base, **rest)
     return Family(name=name or "-".join([scenario.name, "family", *ranges]), base=scenario, ranges=items)
 
 
