@@ -89,7 +89,9 @@ def _emits(emit: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[
 
 
 def _compare(sign: str) -> Callable[..., Any]:
-    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+    """Return an emitter of a comparison; with nan only ``!=`` is true, as for single numbers."""
+    emit = ir.IRBuilder.fcmp_unordered if sign == "!=" else ir.IRBuilder.fcmp_ordered
+    return lambda builder, a, b: emit(builder, sign, a, b)
 
 
 def _pick(sign: str) -> Callable[..., Any]:

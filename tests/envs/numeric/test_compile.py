@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 import pytest
 from tests.support.process import python
 
-from posse.numeric import UNCOMPILED, compiled, kernel
+from posse.numeric import ONE, UNCOMPILED, WIDTH, ZERO, FloatArray, choose, compiled, kernel, load, store
 
 pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
 
@@ -33,6 +34,19 @@ def test_numba_has_the_inner_parts_that_are_used() -> None:
             for each in name.split("."):
                 part = getattr(part, each, None)
             assert part is not None, f"numba {numba.__version__} lacks {module}.{name}, which posse.numeric uses"
+
+
+@kernel
+def write_not_equal(values: FloatArray, found: FloatArray) -> None:
+    x = load(values, 0)
+    store(found, 0, choose(x != x, ONE, ZERO))
+
+
+def test_nan_in_lanes_differs_from_itself_as_a_single_number_does() -> None:
+    values, found = np.ones(WIDTH, np.float32), np.zeros(WIDTH, np.float32)
+    values[3] = np.nan
+    write_not_equal(values, found)
+    assert found.tolist() == (values != values).tolist()
 
 
 @compiled
