@@ -109,7 +109,7 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
 
 @compiled
 def begin(c: Record, worlds: WorldArrays, e: int) -> None:
-    """Reset world e to the start of an episode, but for poses, faults and sums of metrics."""
+    """Reset world e to the start of an episode, but for poses, faults, score and sums of metrics."""
     w, trackers = worlds.world[e], worlds.tracker[e]
     worlds.heard[e]["step"][:] = -1
     worlds.heard_message[e][:] = ZERO
@@ -121,14 +121,13 @@ def begin(c: Record, worlds: WorldArrays, e: int) -> None:
         for i in range(c.num_trackers):
             o = worlds.odometry[e, i]
             o.x, o.y, o.heading, o.cos, o.sin = ZERO, ZERO, ZERO, ONE, ZERO
-    w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
+    w.step, w.over, w.terminated = 0, 0, 0
     w.speed = ZERO if c.target_is_agent else c.target_speed
     w.turn_rate = ZERO
     w.frame_cos, w.frame_sin = w.heading_cos, w.heading_sin
     w.goal_cos, w.goal_sin = w.heading_cos, w.heading_sin
     w.touching = np.uint64(0)
     w.working = c.num_trackers
-    w.score = ZERO
     w.settled_at, w.detected_at, w.lost_at, w.recovered_at = -1, -1, -1, -1
     w.contacts_tracker, w.contacts_obstacle, w.contacts_target = 0, 0, 0
     w.least_gap = np.float32(1e6)

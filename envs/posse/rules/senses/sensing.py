@@ -30,7 +30,7 @@ def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s:
         return False
     if not c.all_round:
         along = dx * t.heading_cos + dy * t.heading_sin
-        if along < c.view_cosine * np.float32(math.sqrt(d2)):
+        if along < c.view_cosine * root(d2):
             return False
     return not hidden(c, t, dx, dy, s)
 

@@ -184,7 +184,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
                 if x * x + y * y < clear * clear:
                     value -= _BLOCKED
             if t.broken_at == NEVER:
-                value += np.float32(math.sqrt(moved_x * moved_x + moved_y * moved_y))
+                value += root(moved_x * moved_x + moved_y * moved_y)
         if c.walled:
             value += free_time(c, w, obstacles, ux, uy)
         if value > best:

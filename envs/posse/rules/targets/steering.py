@@ -6,12 +6,11 @@ block the target, which then turns on the spot, both circles may be occupied: th
 wider side until one is free, and contacts stop it (:mod:`posse.rules.contact`).
 """
 
-import math
 from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled
+from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled, root
 from posse.rules.discs import surroundings_within, to_wall
 from posse.rules.kinematics import arc, turn_towards
 
@@ -106,5 +105,5 @@ def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) ->
     width = to_wall(c, x, y)
     for o in obstacles:
         dx, dy = o.x - x, o.y - y
-        width = min(width, np.float32(math.sqrt(dx * dx + dy * dy)) - o.radius)
+        width = min(width, root(dx * dx + dy * dy) - o.radius)
     return np.float32(width)
