@@ -18,15 +18,15 @@ from posse.declarations import Declarations, reward_term
 from posse.numeric import UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.numeric.compile import stamp
 from posse.numeric.lanes import fetch
-from posse.rules.contact import meet
+from posse.rules.contact import find_contacts
 from posse.rules.discs import find_gaps, lay_out
 from posse.rules.faults import apply_faults, draw_coming_faults
 from posse.rules.motion import drift, motion
 from posse.rules.randomness import mix
-from posse.rules.score import occupy, settle
+from posse.rules.score import find_occupied, settle
 from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
-from posse.rules.senses.sonar import listen
+from posse.rules.senses.sonar import write_sonar
 from posse.rules.start import begin, draw_start, is_clear, target_can_turn
 from posse.rules.state import WorldArrays, config_record, new_scratch, slot_records
 from posse.scenarios import Scenario
@@ -164,22 +164,23 @@ def advance_worlds(
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:
-            meet(c, w, trackers, obstacles, scratch)
+            find_contacts(c, w, trackers, obstacles, scratch)
             sense(c, worlds, e, made, scratch)
-            occupy(c, w, trackers, fixed.slots, scratch)
+            find_occupied(c, w, trackers, fixed.slots, scratch)
         if order == STEP:
             end_step(c, w, trackers, fixed.slots, made)
             reward(c, w, trackers, fixed, made, rewards, terms)
         else:
             if order != LOOK:
-                w.held, w.score = 0, ZERO  # a start is no step: what occupy() found does not count
+                w.held, w.score = 0, ZERO  # a start is no step: what find_occupied() found does not count
             rewards[:] = ZERO
             terms[:, :] = ZERO
         results.scores[e] = w.score
         results.terminated[e] = w.terminated != 0
         results.truncated[e] = w.over != 0 and w.terminated == 0
         over += w.over
-        listen(c, w, trackers, scratch, observations, made.own_size)
+        # Here, since scratch memory holds the discs of this world.
+        write_sonar(c, w, trackers, scratch, observations, made.own_size)
     observe_together(c, worlds, first, end, made, scratch, results.observations)
     return over
 

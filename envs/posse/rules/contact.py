@@ -77,7 +77,7 @@ def free_of_surroundings(
 
 
 @compiled
-def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
+def find_contacts(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Find contacts, count those that begin, and mark robots with something near.
 
     ``near`` marks robots that could touch something within the next control step; the others move
@@ -95,7 +95,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         if t.near:
             dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
             target_near = target_near or dx * dx + dy * dy <= reach * reach
-            if meet_closely(c, w, t, obstacles, i, s):
+            if contacts_of(c, w, t, obstacles, i, s):
                 target_touching |= BIT << np.uint64(i)
         else:
             t.touching_trackers, t.touching_obstacles, t.touching = NO_BITS, NO_BITS, 0
@@ -124,7 +124,7 @@ def count_bits(mask: np.uint64) -> int:
 
 
 @compiled
-def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
+def contacts_of(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Find the contacts of tracker i with something near; return whether it touches the target."""
     bit, touch = BIT << np.uint64(i), c.robot_radius + c.robot_radius + TOUCHING_GAP
     # The target.

@@ -46,12 +46,12 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, w
             move_swept(c, w, c.num_trackers, obstacles, s)
         for i, t in enumerate(trackers):
             if t.near and t.broken_at == NEVER:
-                obey(c, t, wanted[i])
+                follow_command(c, t, wanted[i])
                 move_swept(c, t, i, obstacles, s)
 
 
 @compiled
-def obey(c: Record, t: Record, wanted: FloatArray) -> None:
+def follow_command(c: Record, t: Record, wanted: FloatArray) -> None:
     """Set a tracker's speed and turn rate after an action, within the limits."""
     to_speed, to_turn = HALF * (wanted[0] + ONE) * t.max_speed, wanted[1] * t.max_turn_rate
     if c.actuator_lag > ZERO:
@@ -107,7 +107,7 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
             near = True
         elif t.broken_at == NEVER:
             for _ in range(parts):
-                obey(c, t, wanted[i])
+                follow_command(c, t, wanted[i])
                 move_freely(t, time)
     if near:
         move_in_parts(c, w, trackers, obstacles, wanted, s)

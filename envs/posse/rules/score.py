@@ -14,7 +14,7 @@ from posse.rules.state import BIT, NEVER, NO_BITS
 
 
 @compiled
-def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -> None:
+def find_occupied(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -> None:
     """Determine which tracker occupies which slot, and the distance of each from a free slot.
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).

@@ -84,7 +84,7 @@ def ping(c: Record, robot: Record, number: int, s: Record, o: FloatArray, first:
 
 
 @compiled
-def listen(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
+def write_sonar(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
     """Write the sonar rings of all agents of a world to (rows, F), from ``first`` on."""
     n = c.num_trackers
     for i in range(n):
