@@ -50,7 +50,10 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
 
 @compiled
 def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
-    """List the discs that will be near when the command is executed; return their number."""
+    """List the discs that will be near when the command is executed; return their number.
+
+    Echoes are placed as if the robot had measured them there: elsewhere, delayed teams score less.
+    """
     at, world, settings = team.at, team.world, team.settings
     count, two, radius = 0, 2.0 * world.radius, float(world.radius)
     if me.known:

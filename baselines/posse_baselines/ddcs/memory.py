@@ -19,14 +19,14 @@ from posse import ObservationLayout, Scenario
 from posse.declarations import FIELDS
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, over_worlds, record_type
 from posse.rules import beam_directions
-from posse.scenarios.scenario import OPEN_PLANE_EXTENT
+from posse.scenarios.scenario import OPEN_PLANE_EXTENT, UNLIMITED
 from posse_baselines.ddcs.settings import TASKS, Settings
 from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.steering import work_for
-from posse_baselines.policy import check_observations
+from posse_baselines.policy import PolicyError, check_observations
 
 _F, _I, _C = np.float32, np.int32, np.complex64
-_MOST_WAITING: Final = 10  # control steps; a longer delay is not foreseen
+_MOST_WAITING: Final = 10  # control steps; commands with a longer delay are not foreseen
 
 
 # --- what a team has in common -------------------------------------------------------------------
@@ -69,8 +69,8 @@ def offsets_of(layout: ObservationLayout) -> Records:
 def constants_of(scenario: Scenario) -> Records:
     """Return what is constant of robots and arena, as an array of one record; a metre is a unit of :func:`unit_of`."""
     unit, dt, lag = unit_of(scenario), _F(scenario.control_step), scenario.actuator_lag
-    delay = scenario.command_delay if scenario.command_delay <= _MOST_WAITING else 0
-    half_width, half_height = (half / unit for half in scenario.half_sides)
+    delay = scenario.command_delay
+    half_width, half_height = (min(half, UNLIMITED) / unit for half in scenario.half_sides)
     sight = min(scenario.sensing_range / unit, _MOST_SIGHT)
     unlisted = scenario.neighbours < scenario.num_trackers - 1
     return record(
@@ -83,6 +83,7 @@ def constants_of(scenario: Scenario) -> Records:
         # cosine of a little more than half a beam's width
         wide_beam=_F(math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))),
         radius=_F(scenario.robot_radius / unit),  # of a robot's disc, m
+        slowest=float(_F(min(scenario.tracker_speeds)) / _F(unit)),  # greatest speed of the slowest tracker, m/s
         patience=patience_of(scenario),  # silence up to which a team-mate counts as working and in range, s
         walled=_I(scenario.walled),
         half_width=_F(half_width),  # of the arena, m
@@ -237,6 +238,9 @@ class Minds(OwnArrays):
 
     def __init__(self, layout: ObservationLayout, settings: Settings, num_worlds: int, robots: int) -> None:
         self.layout, unit = layout, unit_of(layout.scenario)
+        if layout.scenario.command_delay > _MOST_WAITING:
+            least = f"at most {_MOST_WAITING}: a longer control_step makes it fewer steps"
+            raise PolicyError(f"the DDCS foresees no command_delay={layout.scenario.command_delay}, but {least}")
         cosines, sines = beam_directions(layout.scenario)
         self.team = Team(
             offsets_of(layout),

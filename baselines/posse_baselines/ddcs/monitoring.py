@@ -26,6 +26,7 @@ _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
 _TARGET_LOST: Final = 10.0  # s; a fix older than this is no longer followed
 _FRAME_TRUST: Final = 0.5  # share of a new measurement in the offset between a team-mate's frame and the own one
+_NO_ROW: Final = "observations that are no scenario's, perhaps normalised: numbers of trackers are out of range"
 _SPEED_MEMORY: Final = 3.0  # s; time constant of the target's estimated speed
 
 
@@ -116,6 +117,8 @@ def monitor(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
 def read_body(team: Team, me: Record, row: FloatArray) -> None:
     """Read the robot's number, pose, motion and limits from its observation (F,), once a step."""
     at = team.at
+    if not 0.0 <= row[at.number] < len(team.slots):
+        raise ValueError(_NO_ROW)
     me.number = int(row[at.number])
     me.position, me.heading = pair(row, at.position), pair(row, at.heading)
     me.speed, me.omega = row[at.speed], row[at.turn_rate]
@@ -160,8 +163,8 @@ def watch_target(team: Team, me: Record, row: FloatArray) -> None:
         me.known = 1
     me.target, theta = target_after(team, me, me.fix_age)
     me.target_theta, me.target_velocity = theta, vector(me.target_speed, theta)
-    # How fast the frame turns at most: the outermost slot has to be no faster than a tracker.
-    limit = max(0.0, min(0.8 * (me.max_speed - me.target_speed), me.target_speed)) / team.world.outermost
+    # How fast the frame turns at most: the outermost slot has to be no faster than any tracker.
+    limit = max(0.0, min(0.8 * (team.world.slowest - me.target_speed), me.target_speed)) / team.world.outermost
     me.psi_limit = limit
     psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
     # A frame at the target's heading turns at its rate. With that rate pursuit is exact for a target on a circle; the
@@ -209,6 +212,8 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         number, age, away = int(row[at.neighbour_number + k]), row[at.neighbour_age + k], row[at.neighbour_range + k]
         if number < 0:
             continue
+        if number >= len(mates):
+            raise ValueError(_NO_ROW)
         # Nearest first: others are farther away than the last of the list, or not heard.
         if age < team.world.patience:
             me.horizon = away

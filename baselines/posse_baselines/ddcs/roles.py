@@ -46,7 +46,7 @@ def appoint(me: Record, leader: int, term: int, pulse: int) -> None:
 
 
 @compiled
-def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]:
+def nearest_tracker(me: Record, mates: Records) -> tuple[int, float]:
     """Return the working tracker nearest to the target, this one or one that does not lead, and its distance."""
     best, least = me.number, length(me.target - me.position)
     for j in range(len(mates)):
@@ -58,11 +58,11 @@ def nearest_tracker(team: Team, me: Record, mates: Records) -> tuple[int, float]
 
 
 @compiled
-def select_leader(team: Team, me: Record, mates: Records) -> None:
+def select_leader(me: Record, mates: Records) -> None:
     """Appoint a tracker other than the leader under a new term."""
     best, term = int(me.number), me.term + 1
     if me.known:
-        best, _ = nearest_tracker(team, me, mates)
+        best, _ = nearest_tracker(me, mates)
     elif me.others == 0:
         term = me.term - 1
     appoint(me, best, term % COUNT, 0)
@@ -84,18 +84,18 @@ def settle_lead(team: Team, me: Record, mates: Records) -> None:
     if me.leader == me.number:
         me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1
     if me.leader < 0:
-        select_leader(team, me, mates)
+        select_leader(me, mates)
         return
     # In the search there are no followers, and leadership changes without the exchange task.
     if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
         return
     if me.leader == me.number:
         if me.known and is_due(team, me, settings.time_lag):
-            best, least = nearest_tracker(team, me, mates)
+            best, least = nearest_tracker(me, mates)
             if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
                 appoint(me, best, (me.term + 1) % COUNT, 0)
     elif since(team, me, me.pulse_step) > team.world.patience + settings.lead_patience:
-        select_leader(team, me, mates)
+        select_leader(me, mates)
 
 
 @compiled

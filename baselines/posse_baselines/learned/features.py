@@ -65,6 +65,8 @@ class Known(NamedTuple):
     """Offsets of an observation's fields, an array of one record."""
     slots: Places
     """(N,) in the slot frame, m."""
+    slowest: np.float32
+    """Greatest speed of the slowest tracker, m/s."""
     half: complex
     """Half the width and half the height of the arena, m; infinite on the open plane."""
     first: bool
@@ -95,7 +97,7 @@ def write_features(row: FloatArray, known: Known, estimate: Record, places: Plac
     theta, frame = pair(row, f.target_heading), pair(row, f.target_frame)
     ahead: Any = dot(pair(row, f.target_velocity), theta)  # robots move along their headings, which are less noisy
     velocity, target = _estimate(row, f, theta, max(ahead, ZERO), known.share, estimate)
-    turn, rate = _turn_of_frame(row, f, slots, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
+    turn, rate = _turn_of_frame(row, known, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
     frame *= turn
     for s in range(len(slots)):
         place = target + slots[s] * frame
@@ -150,17 +152,17 @@ def _turn_to(way: complex, row: FloatArray, f: Record) -> Any:
 
 
 @compiled
-def _turn_of_frame(row: FloatArray, f: Record, slots: npt.NDArray[np.complex64], behind: float) -> tuple[complex, Any]:
+def _turn_of_frame(row: FloatArray, known: Known, behind: float) -> tuple[complex, Any]:
     """Return the turn of the slot frame since the fix, a unit vector, and how fast it turns (rad/s).
 
     It was ``behind`` the target's heading, to which it turns, at most so fast that the outermost slot is no faster than
-    a tracker.
+    any tracker.
     """
-    outermost: Any = _SMALL
+    f, slots, outermost = known.at[0], known.slots, _SMALL
     v: Any = length(pair(row, f.target_velocity))
     for s in range(len(slots)):
         outermost = max(outermost, length(slots[s]))
-    most = max(ZERO, min(_FRAME_SHARE * (row[f.max_speed] - v), v)) / outermost
+    most = max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
     turn = clip(behind, -most * row[f.target_age], most * row[f.target_age])
     return complex(math.cos(turn), math.sin(turn)), clip((behind - turn) / row[f.control_step], -most, most)
 

@@ -145,8 +145,8 @@ class Encoder(OwnArrays):
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
         noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
         share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(patience_of(layout.scenario))
-        half = complex(*layout.scenario.half_sides)
-        self._for_features = Known(offsets_of(layout), slots, half, first, share, patience), *work
+        half, slowest = complex(*layout.scenario.half_sides), np.float32(min(layout.scenario.tracker_speeds))
+        self._for_features = Known(offsets_of(layout), slots, slowest, half, first, share, patience), *work
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import begin, load, rollout
+from posse_baselines import PolicyError, begin, load, play, rollout
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
@@ -33,6 +33,28 @@ def test_claims_that_name_no_robot_or_slot_of_the_team_are_none() -> None:
     batch.layout.views(observations)["neighbour_message"][...] = 0.6
     _, memory = policy.act(observations, begin(policy, batch))
     assert memory.mates["leader"].max() == memory.mates["slot"].max() == -1
+
+
+@pytest.mark.parametrize("field", ["number", "neighbour_number"])
+def test_numbers_of_no_tracker_are_refused(field: str) -> None:
+    policy, batch = load("ddcs-distributed"), posse.batch(message_size=5)
+    batch.layout.views(observations := batch.reset())[field][...] = 7.0
+    with pytest.raises(ValueError, match="observations that are no scenario's"):
+        policy.act(observations, begin(policy, batch))
+
+
+def test_delays_that_are_not_foreseen_are_refused() -> None:
+    policy = load("pngl")
+    begin(policy, posse.batch(message_size=5, command_delay=10))
+    with pytest.raises(PolicyError, match="command_delay=11, but at most 10"):
+        begin(policy, posse.batch(message_size=5, command_delay=11))
+
+
+@pytest.mark.parametrize(("name", "least"), [("ddcs-distributed", 0.8), ("learned-smart", 0.68)])
+def test_unequal_robots_agree_on_the_turn_of_the_slots(name: str, least: float) -> None:
+    """The slowest one limits it; at the own speed of the others it would be six times as fast."""
+    batch = posse.batch("accelerating", 40, message_size=5, tracker_speed=(0.7, 1.5, 1.5, 1.5, 1.5))
+    assert play(batch, load(name))["score"].mean() > least
 
 
 def test_noise_of_the_headings_is_filtered() -> None:
