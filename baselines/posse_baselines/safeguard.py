@@ -35,6 +35,7 @@ class Guard(Minds):
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         scenario = layout.scenario
         super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
+        self.team.world["drifts"] = 0  # messages are the learner's own: no frames are measured by them
 
     def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
@@ -73,7 +74,7 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         own = env.unwrapped.action_space, env.unwrapped.observation_space
         twice = env.has_wrapper_attr("guard")
     else:
-        raise TypeError(f"{env!r:.80} is no environment of posse for PettingZoo or Gymnasium")
+        raise TypeError(f"{env!r:.80} is neither posse.parallel_env(...) nor a single environment of gymnasium.make")
     if twice:
         raise PolicyError("the environment is behind the safeguard already: guard it once")
     if not isinstance(space, spaces.Box):

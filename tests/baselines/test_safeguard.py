@@ -155,13 +155,25 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
 
 
+def test_messages_of_a_learner_do_not_move_the_safeguard_where_poses_drift() -> None:
+    batch, actions = posse.batch("smart", 4, message_size=5, odometry_drift=0.05, autoreset="disabled"), []
+    for said in (0.0, 0.3):
+        observations, guard = batch.reset(seed=1), Guard(batch.layout, 4)
+        for _ in range(100):
+            given = np.full(batch.action_shape, said) * [0, 0, 1, 1, 1, 1, 1]
+            given[..., 0] = 1.0
+            observations, *_ = batch.step(guard.actions(observations, given))
+        actions.append(batch.arrays.tracker["x"].copy())
+    np.testing.assert_array_equal(*actions)
+
+
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))
     with pytest.raises(PolicyError, match="put it round the safeguard"):
         Safeguard(gymnasium.wrappers.FlattenObservation(gymnasium.make("posse/Team-v0")))
     for other in (3, gymnasium.make("Pendulum-v1")):
-        with pytest.raises(TypeError, match="no environment of posse"):
+        with pytest.raises(TypeError, match="nor a single environment"):
             Safeguard(other)
     for env in (Safeguard(gymnasium.make("posse/Team-v0")), Safeguard(posse.parallel_env())):
         env.unwrapped.reset()  # not that of the guarded environment
