@@ -1,7 +1,10 @@
 """Settings that declare themselves: unit, range, and whether tuning may change them."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+
+from posse.declarations import unknown
 
 
 class Tunable(NamedTuple):
@@ -42,6 +45,8 @@ def check(settings: Any) -> None:
         name, value, meta, hint = field.name, getattr(settings, field.name), field.metadata, hints[field.name]
         if get_origin(hint) is Literal and value not in (choices := get_args(hint)):
             raise ValueError(f"{name}={value!r:.80} is unknown; known: {', '.join(choices)}")
+        if hint is bool and not isinstance(value, bool):
+            raise ValueError(f"{name}={value!r:.80} must be True or False")
         if "low" not in meta or (value is None and type(None) in get_args(hint)):
             continue
         whole = int in (hint, *get_args(hint))
@@ -52,6 +57,15 @@ def check(settings: Any) -> None:
             raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
         if (below := meta.get("above")) and not getattr(settings, below) < value:
             raise ValueError(f"{below}={getattr(settings, below)!r} must be below {name}={value!r}: a hysteresis")
+
+
+def changed(settings: Any, values: Mapping[str, Any]) -> Any:
+    """Return a settings object with some values changed; ValueError for an unknown name, or a value out of range."""
+    names = [field.name for field in dataclasses.fields(settings)]
+    for name in values:
+        if name not in names:
+            raise ValueError(unknown("setting", name, names))
+    return dataclasses.replace(settings, **values)
 
 
 def tunables(settings: Any) -> tuple[Tunable, ...]:

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout, TargetPolicy
 from posse.adapters.actions import as_motions
 from posse.numeric import BoolArray, FloatArray
+from posse.scenarios.setting import check_count
 
 Memory = Any
 """What a policy remembers of its worlds; opaque to all but the policy."""
@@ -104,9 +105,11 @@ def check_observations(observations: npt.ArrayLike, robots: tuple[int, ...], lay
 
 
 def check_policy(policy: object) -> None:
-    """Raise TypeError for what is no policy."""
+    """Raise TypeError for what is no policy, PolicyError for one of a target."""
     if not isinstance(policy, Policy):
         raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; load() takes names")
+    if getattr(policy, "side", "trackers") == "target":
+        raise PolicyError(f"policy {policy.name!r} moves a target: give it as target=, or --target")
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
@@ -143,7 +146,7 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         if not callable(function):
             raise TypeError(f"from_function takes a function, got {reprlib.repr(function)}")
         self.name = getattr(function, "__name__", "function") if name is None else name
-        self.message_size = message_size
+        self.message_size = check_count("message_size", message_size, 0)
         self._function = function
         self._discrete = discrete_actions
 

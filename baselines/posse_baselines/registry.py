@@ -88,13 +88,12 @@ def load(policy: str | Path | Policy) -> Policy:
         return policy
     text = str(policy)
     found = _found("policy", text, _teams(), FILES)
-    if getattr(found, "side", "trackers") == "target":
-        raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
     if not isinstance(found, Policy):
         raise PolicyError(
             f"{text!r:.120} is not a policy: it must have name, message_size, reads_state, begin, "
-            "act, restart and annotations, as posse_baselines.Policy says"
+            "act, restart and annotations, as posse_baselines.Policy says; from_function makes one of a function"
         )
+    check_policy(found)
     return found
 
 
@@ -106,9 +105,12 @@ def load_target(target: str | Path | Target) -> Target:
 
     Raises:
         PolicyError: As with :func:`posse_baselines.load`; or the policy of a team.
+        TypeError: Something else.
     """
     if isinstance(target, Target):
         return target
+    if not isinstance(target, str | Path):
+        raise TypeError(f"{target!r:.80} is no target: give a name, a file, or Target(name, 'agent', policy)")
     text = str(target)
     found = _found("target", text, _targets(), {".safetensors": LearnedPolicy.from_file})
     if isinstance(found, Target):

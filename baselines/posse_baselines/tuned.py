@@ -3,7 +3,6 @@
 Their files are JSON, checked when read; they never run code.
 """
 
-import copy
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -40,17 +39,10 @@ class TunedDDCS(DDCS):
     def __init__(self, name: str, settings: Settings | None = None, card: Mapping[str, Any] | None = None) -> None:
         super().__init__(settings or FAMILY[TUNED[name]], name)
         self.card: Mapping[str, Any] = card or {}
-        self._changes: dict[str, Any] = {}
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings that are played on a scenario."""
         return replace(self.settings if self.card else tuned_settings(self.name, scenario), **self._changes)
-
-    def with_settings(self, **values: Any) -> "TunedDDCS":
-        """Return a policy whose tuned settings are changed so; ValueError if a value is out of its range."""
-        changed = copy.copy(self)
-        changed.settings, changed._changes = replace(self.settings, **values), {**self._changes, **values}
-        return changed
 
 
 def tuned_settings(name: str, scenario: Scenario) -> Settings:

@@ -8,7 +8,7 @@ import pytest
 from tests.support.learned import policy_for, target_for
 
 import posse
-from posse_baselines import PolicyError, batch_for, load, load_target, play, policy_names, target_names
+from posse_baselines import PolicyError, batch_for, deploy, load, load_target, play, policy_names, target_names
 from posse_baselines.policies.open_loop import OPEN_LOOP
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -83,12 +83,16 @@ def test_a_scripted_target_is_the_scenarios_motion() -> None:
 def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
     file, team = tmp_path / "evader.safetensors", tmp_path / "team.safetensors"
     target_for(SHORT).save(file)
-    with pytest.raises(PolicyError, match=r"policy of a target: give it as target="):
+    with pytest.raises(PolicyError, match=r"moves a target: give it as target="):
         load(file)
     policy_for(posse.ObservationLayout(SHORT)).save(team)
     with pytest.raises(PolicyError, match="policy of a team, 'mine'"):
         load_target(team)
     evader = load_target(file)
+    with pytest.raises(PolicyError, match="'evading' moves a target"):
+        deploy(evader.policy, posse.Robot("duel", 0))
+    with pytest.raises(TypeError, match="is no target: give a name"):
+        load_target(evader.policy)
     with pytest.raises(PolicyError, match="plays the target's motion ahead"):
         batch_for(load("planner"), SHORT, 1, evader)
     with pytest.raises(PolicyError, match="give a target too"):

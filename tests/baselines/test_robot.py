@@ -133,6 +133,11 @@ def test_a_radio_that_is_later_than_the_scenarios_is_told() -> None:
             robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, heard=[heard])
 
 
+def test_a_pose_that_no_robot_of_the_scenario_reaches_is_told() -> None:
+    with pytest.warns(UserWarning, match="'obstacles' reaches 10 m from its middle"):
+        Robot("obstacles", 0).observe((11.0, 0.0, 0.0), 0.0, 0.0)
+
+
 def test_invalid_measurements_are_refused() -> None:
     robot = Robot("field", 1)
     beams = robot.scenario.sonar_beams

@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 from stable_baselines3 import DQN, PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -27,11 +28,13 @@ def acted(policy: Any, **settings: Any) -> tuple[Any, Any]:
 
 def test_one_observation_plays_each_tracker() -> None:
     solo = posse.get_scenario("constant", num_trackers=1, num_neighbours=0)
-    model = PPO("MlpPolicy", gymnasium.make("posse/Solo-v0", scenario=solo), device="cpu")
+    env = VecNormalize(DummyVecEnv([lambda: gymnasium.make("posse/Solo-v0", scenario=solo)]))
+    env.obs_rms.mean += 1.0
+    model = PPO("MlpPolicy", env, device="cpu")
     observations, actions = acted(from_sb3(model), num_trackers=3, num_neighbours=0)
     for e in range(2):
         for i in range(3):
-            expected = model.predict(observations[e, i], deterministic=True)[0]
+            expected = model.predict(env.normalize_obs(observations[e, i]), deterministic=True)[0]
             np.testing.assert_allclose(actions[e, i], expected, rtol=1e-5, atol=1e-5)
 
 
@@ -49,6 +52,11 @@ def test_no_robot_alone_plays_the_model_of_a_team() -> None:
     model = PPO("MlpPolicy", gymnasium.make("posse/Team-v0"), device="cpu")
     with pytest.raises(PolicyError, match="reads the observations of all trackers"):
         deploy(from_sb3(model), posse.Robot("constant", 0))
+    ends = np.float32(0.0), np.float32(1.0)
+    scaled = PPO("MlpPolicy", gymnasium.wrappers.RescaleAction(gymnasium.make("posse/Team-v0"), *ends), device="cpu")
+    for wrong, message in ((scaled, r"learned on those in \[-1, 1\]"), ("solo.zip", r"PPO\.load\(path\)")):
+        with pytest.raises(PolicyError, match=message):
+            from_sb3(wrong)
 
 
 @pytest.mark.parametrize("safeguard", [False, True])
@@ -68,6 +76,9 @@ def test_encoded_observations_are_played(safeguard: bool) -> None:
 
 
 def test_a_function_plays_as_a_policy() -> None:
+    with pytest.raises(ValueError, match="message_size=-1 must be"):
+        from_function(np.zeros_like, message_size=-1)
+
     def ahead(observations: Any) -> Any:
         return np.full((*observations.shape[:2], 2), 0.5)
 

@@ -42,14 +42,14 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
             ``posse/Solo-v0`` and ``posse/Team-v0`` by default, what the team-mates need in
             ``posse/Tracker-v0``. A model whose action lacks the message says zeros.
         encoding: How observations were encoded for it, where it learned in ``TeamVecEnv``.
-        normalize: The wrapper whose statistics it learned with, if any.
+        normalize: The wrapper whose statistics it learned with; default: the model's own, which one from a file lacks.
         safeguard: Whether it learned behind the safeguard, as in ``TeamVecEnv(..., safeguard=True)``.
 
     Attributes:
         whole_team: Whether one observation is that of all trackers, so that no robot can play it alone.
 
     Raises:
-        PolicyError: Spaces that no environment of posse has.
+        PolicyError: Spaces that no environment of posse has; no model.
     """
 
     def __init__(
@@ -62,15 +62,21 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         normalize: VecNormalize | None = None,
         safeguard: bool = False,
     ) -> None:
+        if not isinstance(model, BaseAlgorithm):
+            raise PolicyError(f"{model!r:.80} is no model: load the file by its class, PPO.load(path)")
         self.model, self.message_size = model, message_size
         self.name = name or type(model).__name__
-        self._encoding, self._normalize, self._safeguard = encoding, normalize, safeguard
+        self._encoding, self._safeguard = encoding, safeguard
+        self._normalize = normalize or model.get_vec_normalize_env()
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
             raise PolicyError(
                 f"a model with observations {model.observation_space} plays no team: it must have learned on (F,) or "
                 "(N, F)"
             )
+        actions = model.action_space
+        if isinstance(actions, spaces.Box) and not (np.all(actions.low == -1) and np.all(actions.high == 1)):
+            raise PolicyError(f"a model with actions {actions} plays no team: it must have learned on those in [-1, 1]")
         self._discrete = isinstance(model.action_space, (spaces.Discrete, spaces.MultiDiscrete))
         self.whole_team = len(shape) == 2
 
@@ -85,7 +91,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
             raise PolicyError(
                 f"policy {self.name!r} learned on observations {wanted}, and those of {layout.scenario.name!r} "
                 f"with message_size={layout.scenario.message_size} are {got}: give from_sb3 the message_size that it "
-                "learned with, and the scenario its settings"
+                "learned with, the scenario its settings, and the model no wrapper that changes observations"
             )
         rows = num_worlds * (1 if self.whole_team else layout.scenario.num_trackers)
         guard = Guard(layout, num_worlds) if self._safeguard else None

@@ -24,8 +24,9 @@ The leader is the tracker nearest to the target (nearest-neighbour rule); it tak
 others take slots by least total time (:mod:`~posse_baselines.ddcs.roles`).
 """
 
+import copy
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
+from posse_baselines.fields import changed
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work, work_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError
@@ -77,14 +79,17 @@ class DDCS(BasePolicy):
     def __init__(self, settings: Settings | None = None, name: str | None = None) -> None:
         self.settings = settings or Settings()
         self.name = name or f"ddcs-{self.settings.model}"
+        self._changes: dict[str, Any] = {}
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings that are played on a scenario."""
         return self.settings
 
-    def with_settings(self, **values: Any) -> "DDCS":
-        """Return a policy with some settings changed; ValueError if a value is out of its range."""
-        return DDCS(replace(self.settings, **values), self.name)
+    def with_settings(self, **values: Any) -> Self:
+        """Return a policy with some settings changed; ValueError for an unknown one, or a value out of its range."""
+        other = copy.copy(self)
+        other.settings, other._changes = changed(self.settings, values), {**self._changes, **values}
+        return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start; PolicyError if the scenario does not fit."""

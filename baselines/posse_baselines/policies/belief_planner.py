@@ -329,7 +329,7 @@ class BeliefPlanner(DDCS):
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings of ``ddcs-tuned`` for a scenario, but for ``apart``, which keeps its default."""
-        return replace(tuned_settings("ddcs-tuned", scenario), apart=Settings.apart)
+        return replace(tuned_settings("ddcs-tuned", scenario), **{"apart": Settings.apart, **self._changes})
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode; PolicyError as for :class:`DDCS`."""

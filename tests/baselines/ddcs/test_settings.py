@@ -18,6 +18,7 @@ from posse_baselines.ddcs.baseline import FAMILY
         ({"model": "central"}, "model='central' is unknown; known: distributed, centralized"),
         ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
         ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
+        ({"radio": "no"}, "radio='no' must be True or False"),
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
         ({"forbidden": ("flocking>flocking",)}, "forbidden='flocking>flocking' is unknown"),
     ],
@@ -25,6 +26,14 @@ from posse_baselines.ddcs.baseline import FAMILY
 def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Settings(**setting)
+
+
+def test_a_changed_policy_is_of_the_same_kind() -> None:
+    policy: Any = load("belief-planner")
+    changed = policy.with_settings(near=0.5)
+    assert (type(changed), changed.settings_for(posse.get_scenario("smart")).near) == (type(policy), 0.5)
+    with pytest.raises(ValueError, match=r"unknown setting 'alpha'.*did you mean 'alpha_2'"):
+        policy.with_settings(alpha=1.0)
 
 
 def test_both_ends_of_each_range_can_be_played() -> None:
