@@ -62,6 +62,7 @@ INVALID = {
     "verify nowhere": "posse verify: [Errno 2] No such file or directory: 'nowhere/standing.csv'",
     "compare": "No policies given",
     "compare idle mine=": "'mine=' is not a group of policies",
+    "compare two=idle,idle": "'two=idle,idle' names a policy twice",
     "compare idle idle=pursuit": "two policies have the label 'idle'",
     "compare idle --scenario constant konstant": "unknown scenario 'konstant'",
     "compare idle --scenario --episodes 2": "no scenario is given",

@@ -1,5 +1,6 @@
 """Claims for the leaderboard: written into a folder of their own, measured again on fresh worlds."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
     folder = sent(tmp_path, claim, **{name: getattr(claim, name) + 0.1 for name in ("safe_score", "low", "high")})
     raised, measured = verify(folder, episodes=WORLDS, seed=3)
     assert not raised.agrees(measured)
+    assert not replace(measured, reads_state=True).agrees(measured)
     assert measured.seed == 3
     assert measured.low <= measured.safe_score < claim.safe_score + 0.1
     assert cli.main(["verify", str(folder), "--episodes", str(WORLDS), "--seed", "3"]) == 1
@@ -51,6 +53,8 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
         ({"policy": "../p.safetensors"}, "policy="),
         ({"scenario": "nowhere"}, "no scenario 'nowhere'"),
         ({"version": 99}, "of version 99"),
+        ({"seed": 7}, "claims are of seed 2026"),
+        *((wrong, "no play has such") for wrong in ({"worlds": -5}, {"low": 0.99}, {"contact_free": 2.5})),
         ({"safe_score": "high"}, "could not convert"),
         ({"policy": "forged_module:Policy"}, "--run-code"),
     ],

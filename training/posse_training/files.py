@@ -54,7 +54,7 @@ def intact(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another --out") from error
+        raise RunFolderError(f"{path} is damaged, or no run's: {error!r:.200}. Choose another --out") from error
 
 
 def check_held(

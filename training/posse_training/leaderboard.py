@@ -41,7 +41,7 @@ class Standing:
     """What a policy scores on a scenario: mean safe score with its 95 % interval, score, share without contact.
 
     Raises:
-        SettingsError: A text that a page could not show as it is.
+        SettingsError: A text that a page could not show as it is, or numbers that no play has.
     """
 
     label: str
@@ -60,10 +60,14 @@ class Standing:
 
     def __post_init__(self) -> None:
         check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
+        ordered = 0 <= self.low <= self.safe_score <= self.high <= 1
+        if not (ordered and 0 <= self.score <= 1 and 0 <= self.contact_free <= 1 and self.worlds >= 1):
+            others = f"score {self.score}, contact_free {self.contact_free}"
+            raise SettingsError(f"no play has such numbers: {self}, {others}")
 
     def agrees(self, other: "Standing") -> bool:
-        """Return whether the intervals of both safe scores overlap."""
-        return self.low <= other.high and other.low <= self.high
+        """Return whether the intervals of both safe scores overlap, and both read the state or neither does."""
+        return self.reads_state == other.reads_state and self.low <= other.high and other.low <= self.high
 
     def __str__(self) -> str:
         interval = f"{self.safe_score:.4f} [{self.low:.4f}, {self.high:.4f}]"
@@ -179,13 +183,16 @@ def verify(
         seed: Seed of the fresh worlds; default: drawn now, so that no submission can know them.
 
     Raises:
-        SettingsError: An invalid claim, code without ``run_code``, or another version of the scenario.
+        SettingsError: An invalid claim, or one of another seed than 2026; code without ``run_code``, or another version
+            of the scenario.
         PlayError: An error of the policy's own code.
     """
     rows = read_standings(path := folder / CLAIM)
     if len(rows) != 1:
         raise SettingsError(f"{path} must have one row, it has {len(rows)}")
     claim, text = rows[0], rows[0].policy
+    if claim.seed != SEED:
+        raise SettingsError(f"{path}: seed={claim.seed}, and claims are of seed {SEED}")
     if claim.scenario not in scenario_names() or get_scenario(claim.scenario).version != claim.version:
         raise SettingsError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
     if is_code(text) and not run_code:

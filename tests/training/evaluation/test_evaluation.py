@@ -1,5 +1,6 @@
 """Evaluations of a policy on many worlds, and the intervals of their means."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,11 @@ def test_worlds_of_a_drawn_scenario_are_resampled_as_one() -> None:
     assert over_seeds(other, block=10).low == pytest.approx(mean(other, 10).low), "a short block weighs less"
     few = mean(values[:30], 10)  # three blocks
     assert (few.low, few.high) == pytest.approx(stats.t.interval(0.95, 2, means[:3].mean(), stats.sem(means[:3])), 0.1)
+
+
+def test_the_interval_of_a_share_of_all_has_a_width(tmp_path: Path) -> None:
+    (results := evaluate("idle", "constant", 10, start_distance=(9.0, 10.0), **FAST)).write(str(tmp_path / "all.csv"))
+    assert results.estimate("contact_free").low == pytest.approx(10 / (10 + 1.96**2), abs=1e-3)  # Wilson's, of 10 in 10
 
 
 def test_episodes_in_which_it_never_happened_do_not_count() -> None:

@@ -42,8 +42,8 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     own, and code that fails there fails later, where it is to play.
 
     Raises:
-        PolicyError: No contender, a policy that cannot be loaded, a group without files, or a label that two
-            contenders share, or that is the planner's.
+        PolicyError: No contender, a policy that cannot be loaded, a group without files or with one twice, or a label
+            that two contenders share, or that is the planner's.
     """
     if not texts:
         raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
@@ -58,6 +58,8 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
             who = "the reference and another policy" if label == PLANNER else "two policies"
             raise PolicyError(f"{who} have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
+        if len(set(names)) < len(names):
+            raise PolicyError(f"{text!r:.120} names a policy twice: give each training seed once")
         policies = tuple(name if is_code(name) else load(name) for name in names)
         for name in filter(is_code, names):
             with contextlib.suppress(PlayError):

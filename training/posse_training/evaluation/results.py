@@ -11,7 +11,7 @@ import numpy.typing as npt
 from posse import Family, Scenario
 from posse.scenarios.family import BLOCK
 from posse_baselines.files import write_json
-from posse_training.evaluation.statistics import Estimate, mean
+from posse_training.evaluation.statistics import Estimate, mean, share
 from posse_training.files import write_csv
 
 Column = npt.NDArray[np.float64]
@@ -62,7 +62,8 @@ class Results:
 
         Of a family, drawn scenarios are resampled, ten worlds each: the interval is for other scenarios of it.
         """
-        return mean(self[metric], block_of(self.scenario))
+        column, block = self[metric], block_of(self.scenario)
+        return share(column[None] == 1, block) if metric == "contact_free" else mean(column, block)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one dictionary for each episode."""
@@ -80,12 +81,13 @@ class Results:
             for world in range(self.episodes)
         ]
 
-    def write(self, path: Path) -> None:
+    def write(self, path: str | Path) -> None:
         """Write the rows as CSV and the settings as a JSON file of the same name.
 
         Raises:
             OSError: A file could not be written; an old one of that name is unchanged.
         """
+        path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = self.rows()
         write_csv(path, rows)
