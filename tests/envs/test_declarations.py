@@ -61,6 +61,7 @@ MISTAKES: Final = {
     MOTION.format("", "", 'w.goal_cos = "north"'): r"own \(main.py:1\): (.|\n)*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"It creates an array, a list or a text",
     FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"it returns Lanes, not 2 numbers",
+    FIELD.format('"1", 0, 1', "c, v", "v.x if v.x > 0 else v.y"): r"write choose\(condition, one, other\), line \d",
 }  # fmt: skip
 
 ATTEMPTS = """

@@ -104,6 +104,7 @@ class Robot:
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
+        self._farthest = self.scenario.position_bound + self.scenario.drift_bound
         kept = self.scenario
         if kept.perfect_radio:  # such a world stores no messages, since they would equal the state
             kept = kept.replace(radio_loss=_BARELY_LOSSY)
@@ -140,7 +141,8 @@ class Robot:
         """Return the observation (F,) of the next control step.
 
         Args:
-            pose: Own x, y (m) and heading (rad) in the common frame, from odometry or a map.
+            pose: Own x, y (m) and heading (rad) in the common frame, from odometry or a map. A warning tells of one
+                that no robot of the scenario reaches.
             speed: Own speed, m/s.
             turn_rate: Own turn rate, rad/s, positive to the left.
             target_fix: What its own sensor measured of the target; ``None``: it does not see it. Then the last fix
@@ -159,6 +161,9 @@ class Robot:
                 changed.
         """
         x, y, heading = _finite("pose", pose, (3,))
+        if max(abs(x), abs(y)) * self.scale > self._farthest:
+            inside = f"{self.scenario.name!r} reaches {self._farthest / self.scale:.3g} m from its middle"
+            warnings.warn(f"the pose lies outside: {inside}; check the frame, the unit and scale", stacklevel=2)
         speed, turn_rate = _finite("speed and turn_rate", (speed, turn_rate), (2,))
         beams = self.scenario.sonar_beams
         readings = None if sonar is None else np.asarray(sonar, np.float64)

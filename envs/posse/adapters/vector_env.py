@@ -48,8 +48,9 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         autoreset: str | AutoresetMode = "next_step",
         **settings: Any,
     ) -> None:
-        if "num_worlds" in settings:
-            raise ScenarioError("num_worlds= is that of a batch: here it is num_envs=")
+        for name, here in (("num_worlds", "num_envs"), ("max_episode_steps", "horizon")):
+            if name in settings:
+                raise ScenarioError(f"{name}= is not known here: it is {here}=")
         self.num_envs = check_count("num_envs", num_envs, 1)
         mode = autoreset.name.lower() if isinstance(autoreset, AutoresetMode) else autoreset
         super().__init__(scenario, self.num_envs, autoreset=mode, **settings)

@@ -97,7 +97,7 @@ def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) ->
             raise ValueError(f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each")
         if not (np.isfinite(array).all() and (np.abs(array[..., :2]) <= scenario.start_extent).all()):
             raise ValueError(
-                f"{name}={reprlib.repr(options[name])} must be finite; in {scenario.name!r} x lies within "
+                f"{name}={reprlib.repr(options[name])} must be finite, and in {scenario.name!r} x lies within "
                 f"±{most_x:g} m and y within ±{most_y:g} m"
             )
         poses[name] = np.broadcast_to(array, full)

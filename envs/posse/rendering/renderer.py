@@ -44,7 +44,7 @@ class Renderer:
         window: The window of the mode "human"; ``None`` once :meth:`close` was called, or the user closed it.
 
     Raises:
-        ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.
+        ValueError: An unknown mode, a size below :data:`LEAST_SIZE`, or a scale that is not from 0.1 to 10.
         RuntimeError: The mode is "human", and no display is available.
     """
 
@@ -61,6 +61,8 @@ class Renderer:
         given = np.asarray(size)
         if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
             raise ValueError(f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px")
+        if not 0.1 <= scale <= 10:
+            raise ValueError(f"scale={scale!r} must be from 0.1 to 10")
         width, height = int(size[0]), int(size[1])
         self.scenario, self.mode, self.title = scenario, mode, title or scenario.name
         self._canvas = Canvas((width, height))

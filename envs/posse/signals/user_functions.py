@@ -51,6 +51,9 @@ def _why_not(function: Function, arguments: tuple[Any, ...], returns: str) -> st
             fields = {name for kind in arguments for name in getattr(kind, "fields", ())}
             name = missing[1] if missing else error.args[0]
             return unknown("field", name, sorted(fields)).partition(";")[0]  # without the list, which fills a page
+        if ">>> bool(Mask)" in message:
+            line = re.search(r"line \d+", message[message.rfind("File ") :])
+            return f"if takes one number, not eight: write choose(condition, one, other), {line and line[0]}"
         return message.replace("NRT required", "It creates an array, a list or a text: NRT required")
     found: Any = alone.overloads[arguments].signature.return_type
     return "" if _fits(found, returns) else f"it returns {found}, not {returns}"

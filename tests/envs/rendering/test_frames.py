@@ -62,6 +62,8 @@ def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
     batch.reset(options={"tracker_pose": [(0, 0, 0)], "target_pose": (0, 4, 0)})
     (obstacle,) = batch.arrays.obstacle[0]
     obstacle["x"], obstacle["y"], obstacle["radius"] = 2.0, 0.0, 0.5
+    with pytest.raises(ValueError, match=r"scale=0\.0 must be"):
+        Renderer(batch.scenario, scale=0.0)
     renderer = Renderer(batch.scenario)
     frame = frame_of(renderer, batch)
     assert_colour(renderer, frame, (1.2, 0.2), SENSING)
