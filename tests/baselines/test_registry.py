@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,10 +90,11 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match="policy of a team, 'mine'"):
         load_target(team)
     evader = load_target(file)
+    policy: Any = evader.policy
     with pytest.raises(PolicyError, match="'evading' moves a target"):
-        deploy(evader.policy, posse.Robot("duel", 0))
+        deploy(policy, posse.Robot("duel", 0))
     with pytest.raises(TypeError, match="is no target: give a name"):
-        load_target(evader.policy)
+        load_target(policy)
     with pytest.raises(PolicyError, match="plays the target's motion ahead"):
         batch_for(load("planner"), SHORT, 1, evader)
     with pytest.raises(PolicyError, match="give a target too"):

@@ -28,7 +28,7 @@ def acted(policy: Any, **settings: Any) -> tuple[Any, Any]:
 
 def test_one_observation_plays_each_tracker() -> None:
     solo = posse.get_scenario("constant", num_trackers=1, num_neighbours=0)
-    env = VecNormalize(DummyVecEnv([lambda: gymnasium.make("posse/Solo-v0", scenario=solo)]))
+    env: Any = VecNormalize(DummyVecEnv([lambda: gymnasium.make("posse/Solo-v0", scenario=solo)]))
     env.obs_rms.mean += 1.0
     model = PPO("MlpPolicy", env, device="cpu")
     observations, actions = acted(from_sb3(model), num_trackers=3, num_neighbours=0)
@@ -54,6 +54,7 @@ def test_no_robot_alone_plays_the_model_of_a_team() -> None:
         deploy(from_sb3(model), posse.Robot("constant", 0))
     ends = np.float32(0.0), np.float32(1.0)
     scaled = PPO("MlpPolicy", gymnasium.wrappers.RescaleAction(gymnasium.make("posse/Team-v0"), *ends), device="cpu")
+    wrong: Any
     for wrong, message in ((scaled, r"learned on those in \[-1, 1\]"), ("solo.zip", r"PPO\.load\(path\)")):
         with pytest.raises(PolicyError, match=message):
             from_sb3(wrong)

@@ -158,7 +158,8 @@ def _turn_of_frame(row: FloatArray, known: Known, behind: float) -> tuple[comple
     It was ``behind`` the target's heading, to which it turns, at most so fast that the outermost slot is no faster than
     any tracker.
     """
-    f, slots, outermost = known.at[0], known.slots, _SMALL
+    f, slots = known.at[0], known.slots
+    outermost: Any = _SMALL
     v: Any = length(pair(row, f.target_velocity))
     for s in range(len(slots)):
         outermost = max(outermost, length(slots[s]))
