@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from posse import Family, Scenario, ScenarioError
+from posse.declarations import is_number
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
@@ -113,7 +114,7 @@ def prepare(
     time_limit: float | None = None,
 ) -> Evaluation:
     """Return an evaluation; arguments and errors are those of :func:`evaluate`, and a time limit of code, s."""
-    if episodes < 1 or episodes != int(episodes):
+    if not is_number(episodes) or episodes < 1 or episodes != int(episodes):
         raise SettingsError(f"episodes={episodes} must be a whole number of at least 1")
     loaded = load(policy)
     opponent = None if target is None else load_target(target)

@@ -43,7 +43,9 @@ class Display:
 
     def begin(self, steps: int, total: int) -> None:
         """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
-        if total != self._settings.steps:
+        if steps >= total:
+            self.note(f"{steps:,} steps are made already: none is added")
+        elif total != self._settings.steps:
             self.note(f"rollouts are completed: {total:,} steps in all")
         self._started, self._from_steps = time.monotonic(), steps
         self.bar.reset(self._task, total=total, completed=steps)
