@@ -16,25 +16,15 @@ Floats = npt.NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class Instant:
-    """Poses before a step, the team's annotations, and its commands.
+    """Poses before a step, the team's annotations, and its commands."""
 
-    Attributes:
-        time: s.
-        tracker: (E, N, 3), x, y, θ.
-        target: (E, 3).
-        psi: (E,), heading of the slot frame.
-        notes: The policy's annotations, (E, N) each.
-        commands: (E, N, 2), V in m/s and ω in rad/s.
-        broken: (E, N).
-    """
-
-    time: float
-    tracker: Floats
-    target: Floats
-    psi: Floats
-    notes: dict[str, Any]
-    commands: Floats
-    broken: npt.NDArray[np.bool_]
+    time: float  # s
+    tracker: Floats  # (E, N, 3), x, y, θ
+    target: Floats  # (E, 3)
+    psi: Floats  # (E,), heading of the slot frame
+    notes: dict[str, Any]  # the policy's annotations, (E, N) each
+    commands: Floats  # (E, N, 2), V in m/s and ω in rad/s
+    broken: npt.NDArray[np.bool_]  # (E, N)
 
     @property
     def line_of_sight(self) -> npt.NDArray[np.complex128]:
@@ -64,13 +54,11 @@ def drive(
         settings["target_motion"] = "agent"
     settings = {"message_size": team.message_size, "horizon": steps + 1000, **settings}
     batch = posse.batch(scenario, worlds, seed=0, autoreset="disabled", **settings)
-    options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
-    observations = batch.reset(options={k: v for k, v in options.items() if v is not None})
+    observations = batch.reset(options={"tracker_pose": tracker_pose, "target_pose": target_pose})
     memory, s = begin(team, batch), batch.scenario
     limits = np.stack([0.5 * np.array(s.tracker_speeds), s.tracker_turn_rates], -1)
     for step in range(steps):
-        state = {name: array.copy() for name, array in batch.state.items()}
-        given = observations[:, : s.num_trackers]
+        state, given = batch.state, observations[:, : s.num_trackers]
         team_actions, memory = team.act(given, memory)
         actions = np.zeros(batch.action_shape, np.float32)
         actions[:, : s.num_trackers] = team_actions
