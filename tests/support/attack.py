@@ -12,6 +12,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import VectorEnv
 from tests.support.adapters import same
+from tests.support.reference.state import snapshot
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
@@ -47,12 +48,7 @@ MAKERS: dict[str, Callable[..., Any]] = {
 
 
 class Subject:
-    """An environment of one kind.
-
-    Attributes:
-        env: The environment.
-        batch: The batch that it stands on.
-    """
+    """An environment of one kind, and the batch that it stands on."""
 
     def __init__(self, kind: str, **settings: Any) -> None:
         self.kind = kind
@@ -80,12 +76,9 @@ class Subject:
         if self.kind == "torchrl":
             import torch
 
-            for number in (np.nan, np.inf, 2.0):
-                bad = self.good_action(np.random.default_rng(0))
-                bad[("agents", "action")][1, 1, 1] = number
-                yield bad
-            bad = self.good_action(np.random.default_rng(0))
-            yield bad.set(("agents", "action"), torch.full((2, 2, 2), 1j))
+            for number in (np.nan, np.inf, 2.0, 1j):
+                bad = torch.tensor([0.0] * 7 + [number]).reshape(2, 2, 2)
+                yield self.good_action(np.random.default_rng(0)).set(("agents", "action"), bad)
             return
         yield from ("x", LONG_NAME, object(), 5, 10**5000, 1j, [[1], [2, 3]], [10**400, 0], b"ab", slice(3))
         yield from ({"a": 1}, {5: 2}, {10**5000: 1}, np.array(None), [np.nan, 0.0], [1e300, 0.0], np.zeros(2, "M8[s]"))
@@ -107,9 +100,8 @@ class Subject:
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
-        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}]
-        kept.append([batch.seed, batch._started, batch._over])
-        kept.append([copy.copy(getattr(env, name, None)) for name in ("_seeded", "_seed", "agents")])
+        kept: list[Any] = [snapshot(batch), batch.seed, batch._started, batch._over]
+        kept += [copy.copy(getattr(env, name, None)) for name in ("_seeded", "_seed", "agents")]
         if isinstance(env, (gymnasium.Env, VectorEnv)):
             kept.append(repr(env.np_random.bit_generator.state))
         return kept
