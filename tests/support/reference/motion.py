@@ -34,19 +34,12 @@ def free_motion(
     if s.target_motion == "agent":
         speeds[n] = (float(actions[n, 0]) + 1) / 2 * s.target_speed
         turns[n] = float(actions[n, 1]) * s.target_turn_rate
-    alive = working(after)
+    wanted, faster = (actions[:n, 0].astype(np.float64) + 1) / 2 * s.tracker_speeds, s.tracker_acceleration * dt
+    turning, sooner = actions[:n, 1].astype(np.float64) * s.tracker_turn_rates, s.tracker_turn_acceleration * dt
     for _ in range(count):
+        speeds[:n] = np.clip(wanted, speeds[:n] - faster, speeds[:n] + faster) * working(after)
+        turns[:n] = np.clip(turning, turns[:n] - sooner, turns[:n] + sooner) * working(after)
         for i in range(n + 1):
-            if i < n:
-                if not alive[i]:
-                    speeds[i] = turns[i] = 0.0
-                    continue
-                wanted = (float(actions[i, 0]) + 1) / 2 * s.tracker_speeds[i]
-                most = s.tracker_acceleration * dt
-                speeds[i] += max(-most, min(most, wanted - speeds[i]))
-                wanted = float(actions[i, 1]) * s.tracker_turn_rates[i]
-                most = s.tracker_turn_acceleration * dt
-                turns[i] += max(-most, min(most, wanted - turns[i]))
             place[i], heading[i] = on_arc(place[i], heading[i], speeds[i], turns[i], dt)
     return place, heading, np.stack([speeds[:n], turns[:n]])
 
@@ -69,19 +62,11 @@ def free_gaps(s: posse.Scenario, state: State) -> Array:
 
 def path_gaps(s: posse.Scenario, before: State, after: State, freely: Complexes) -> Array:
     """Return a lower bound of every robot's clearance during a step, (N + 1,), m."""
-    n = s.num_trackers
     start, end = positions(before), positions(after)
     centres, radii = obstacles(before)
-    least = np.full(n + 1, np.inf)
     way = np.maximum(np.abs(freely - start), np.abs(end - start))
-    for i in range(n + 1):
-        for j in range(n + 1):
-            if i != j:
-                gap = abs(start[i] - start[j]) - way[i] - way[j] - 2 * s.robot_radius
-                least[i] = min(least[i], gap)
-        if len(radii):
-            gaps = np.abs(start[i] - centres) - way[i] - radii - s.robot_radius
-            least[i] = min(least[i], float(gaps.min()))
-        for half, at in zip(s.half_sides, (start[i].real, start[i].imag), strict=True):
-            least[i] = min(least[i], half - s.robot_radius - abs(at) - way[i])
-    return least
+    robots = np.abs(start[:, None] - start) - way - 2 * s.robot_radius
+    np.fill_diagonal(robots, np.inf)
+    discs = np.abs(start[:, None] - centres) - radii - s.robot_radius
+    walls = np.array(s.half_sides) - np.abs(np.stack([start.real, start.imag], axis=1)) - s.robot_radius
+    return np.asarray(np.concatenate([robots, discs, walls], axis=1).min(axis=1) - way)

@@ -75,12 +75,8 @@ class Episode:
                 self.occupied[i] = own[0]
         assert set(self.occupied.values()) == taken, "which slots are taken does not depend on who"
         free = [c for c in range(n) if c not in taken]
-        distance = np.array(
-            [
-                away[i, self.occupied[i]] if i in self.occupied else away[i, free].min() if free else away[i].min()
-                for i in range(n)
-            ]
-        )
+        nearest = away[:, free or slice(None)].min(axis=1)
+        distance = np.array([away[i, self.occupied[i]] if i in self.occupied else nearest[i] for i in range(n)])
         self.progress = self.distance - distance if step else np.zeros(n)
         self.distance = distance
         sees = [can_see(s, state, i) for i in range(n)]

@@ -37,18 +37,15 @@ def one_world(state: State, e: int) -> State:
     return {name: array[e] for name, array in state.items()}
 
 
-def positions(state: State) -> Complexes:
+def positions(state: State, x: str = "x", y: str = "y") -> Complexes:
     """Return x + iy of the trackers and, last, of the target, (N + 1,)."""
-    x = np.append(state["tracker_x"], state["world_x"]).astype(np.float64)
-    y = np.append(state["tracker_y"], state["world_y"]).astype(np.float64)
-    return x + 1j * y
+    along, across = (np.append(state[f"tracker_{name}"], state[f"world_{name}"]) for name in (x, y))
+    return np.asarray(along.astype(np.float64) + 1j * across)
 
 
 def headings(state: State) -> Complexes:
     """Return cos θ + i sin θ of the trackers and, last, of the target, (N + 1,)."""
-    c = np.append(state["tracker_heading_cos"], state["world_heading_cos"]).astype(np.float64)
-    s = np.append(state["tracker_heading_sin"], state["world_heading_sin"]).astype(np.float64)
-    return c + 1j * s
+    return positions(state, "heading_cos", "heading_sin")
 
 
 def obstacles(state: State) -> tuple[Complexes, Array]:
