@@ -4,6 +4,7 @@ import ctypes
 import os
 import signal
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +86,6 @@ class Watched(BasePolicy):
 
 
 def _claim(path: Path, content: str) -> bool:
-    try:
-        with path.open("x") as file:
-            file.write(content)
-    except FileExistsError:
-        return False
-    return True
+    with suppress(FileExistsError), path.open("x") as file:
+        return file.write(content) > 0
+    return False

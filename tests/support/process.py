@@ -15,11 +15,7 @@ def python(
     *words: str | Path, program: str | Path = sys.executable, cwd: Path = ROOT, seconds: float = 600.0, **variables: str
 ) -> subprocess.CompletedProcess[str]:
     """Run Python with arguments; return what it printed, and how it ended."""
-    paths = [
-        ROOT,
-        *(ROOT / room for room in ("envs", "baselines", "training")),
-        *os.environ.get("PYTHONPATH", "").split(":"),
-    ]
+    paths = ROOT, ROOT / "envs", ROOT / "baselines", ROOT / "training", os.environ.get("PYTHONPATH", "")
     settings: dict[str, Any] = {"capture_output": True, "text": True, "timeout": seconds, "check": False}
     variables = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths)), **variables}
     return subprocess.run([str(program), *map(str, words)], cwd=cwd, env=variables, **settings)
