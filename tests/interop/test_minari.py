@@ -8,7 +8,6 @@ import gymnasium
 import minari
 import numpy as np
 import pytest
-from tests.support.adapters import part
 from tests.support.runs import killed_at
 
 import posse
@@ -42,8 +41,8 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
             assert reward == pytest.approx(episode.rewards[t])
             assert (terminated, truncated) == (episode.terminations[t], episode.truncations[t])
             assert info["score"] == pytest.approx(episode.infos["score"][t + 1])
-            for name, term in part(info, "reward/").items():
-                np.testing.assert_array_equal(term, episode.infos["reward"][name][t + 1])
+            for term in posse.REWARD_TERMS:
+                np.testing.assert_array_equal(info[f"reward/{term.name}"], episode.infos["reward"][term.name][t + 1])
         assert truncated
         assert told["score"] == pytest.approx(info["metrics/score"])
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
@@ -55,15 +54,11 @@ def test_episodes_have_the_numbers_of_their_worlds(tmp_path: Path) -> None:
     assert [episode.id for episode in data] == list(range(5))
 
 
-def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
+def test_a_recording_that_is_killed_leaves_no_data_set_and_a_whole_one_is_not_overwritten(tmp_path: Path) -> None:
     with killed_at(datasets, "_episode", 3):
         record_dataset("idle", "constant", 30, out=tmp_path, **SHORT)
     assert list(tmp_path.rglob("*.hdf5")) == []
     assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
-
-
-def test_a_data_set_is_not_overwritten(tmp_path: Path) -> None:
-    record_dataset("idle", "constant", 1, out=tmp_path, **SHORT)
     with pytest.raises(SettingsError, match="exists: remove it"):
         record_dataset("idle", "constant", 1, out=tmp_path, **SHORT)
 

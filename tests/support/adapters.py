@@ -7,11 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 
-def part(info: Any, prefix: str) -> dict[str, Any]:
-    """Return the entries of an info whose names begin with a prefix, under the rest of their names."""
-    return {name.removeprefix(prefix): value for name, value in info.items() if name.startswith(prefix)}
-
-
 def f32(values: Any) -> npt.NDArray[np.float32]:
     """Return an array of actions as policies return it."""
     return np.array(values, np.float32)

@@ -11,8 +11,10 @@ from gymnasium.error import ResetNeeded
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
-from tests.support.adapters import f32, out_of_band, part, same
+from tests.support.adapters import f32, out_of_band, same
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
+
+from posse import REWARD_TERMS
 
 SEEDS = st.integers(0, 2**63 - 1)
 
@@ -207,5 +209,5 @@ def test_an_environment_is_the_first_world_of_a_batch(kind: str) -> None:
             assert reward == pytest.approx(rewards[0].mean(), rel=1e-5, abs=1e-6)
         info = info["tracker_0"] if kind == "parallel" else info
         assert info["score"] == told["score"][0]
-        for name, values in part(told, "reward/").items():
-            np.testing.assert_array_equal(info[f"reward/{name}"], values[0] if kind == "team" else values[0, 0])
+        for name in (f"reward/{term.name}" for term in REWARD_TERMS):
+            np.testing.assert_array_equal(info[name], told[name][0] if kind == "team" else told[name][0, 0])
