@@ -33,6 +33,10 @@ def test_annotations_that_are_no_numbers_of_each_tracker_are_refused(value: Any)
         recorder.step(np.zeros((1, 5, 2)), {"mood": value})
 
 
+ANGLES = {"tracker_heading": "tracker_heading", "tracker_fix_heading": "tracker_fix"}
+ANGLES |= {"target_heading": "world_heading", "target_frame": "world_frame"}
+
+
 @pytest.mark.parametrize(
     ("policy", "scenario"),
     [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss"), ("pngl", "robots")],
@@ -48,17 +52,10 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
     assert player.frames == 151
     for frame in range(151):
         of = {name: array[0] for name, array in batch.state.items()}
-        for name in ("x", "y", "fix_x", "fix_y"):
+        for name in ("x", "y", "fix_x", "fix_y", "sees", "slot", "fix_step"):
             close(column, f"tracker_{name}", frame, of[f"tracker_{name}"])
-        for name, cosine, sine in (
-            ("tracker_heading", "tracker_heading_cos", "tracker_heading_sin"),
-            ("tracker_fix_heading", "tracker_fix_cos", "tracker_fix_sin"),
-            ("target_heading", "world_heading_cos", "world_heading_sin"),
-            ("target_frame", "world_frame_cos", "world_frame_sin"),
-        ):
-            close(column, name, frame, np.arctan2(of[sine], of[cosine]), angle=True)
-        for name in ("sees", "slot", "fix_step"):
-            close(column, f"tracker_{name}", frame, of[f"tracker_{name}"])
+        for name, unit in ANGLES.items():
+            close(column, name, frame, np.arctan2(of[f"{unit}_sin"], of[f"{unit}_cos"]), angle=True)
         for fault in ("sensor_dead", "radio_dead"):
             since = frame - of[f"tracker_{fault}_from"].astype(np.int64)
             close(column, f"tracker_{fault}", frame, (since >= 0) & (since < outage))
