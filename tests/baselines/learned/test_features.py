@@ -45,13 +45,6 @@ def test_places_that_a_small_team_lacks_are_unknown() -> None:
     assert (named["neighbour_range"][:, 0] > 0).all()
 
 
-def at_rest(batch: posse.Batch) -> FloatArray:
-    """Actions that stop all robots."""
-    actions = np.zeros(batch.action_shape, np.float32)
-    actions[..., 0] = -1.0
-    return actions
-
-
 def ways_to_slots(batch: posse.Batch) -> npt.NDArray[np.complex128]:
     """The way from each tracker to each slot in its own axes, (E, N, N)."""
     frame = points(batch, "world", "frame_cos", "frame_sin")
@@ -93,7 +86,7 @@ def test_slots_go_on_turning_after_the_fix() -> None:
     batch.reset()
     frame = points(batch, "world", "heading_cos", "heading_sin") * np.exp(0.5j)
     batch.arrays.world["frame_cos"], batch.arrays.world["frame_sin"] = frame.real, frame.imag
-    rest = at_rest(batch)
+    rest = np.full(batch.action_shape, (-1.0, 0.0))
     for _ in range(2):  # from two fixes follows a velocity
         observations, *_ = batch.step(rest)
     for _ in range(15):
@@ -114,8 +107,7 @@ def test_four_robots_leave_the_slot_in_a_wall(side: int, inside: set[int]) -> No
     batch = posse.batch("search", start_distance=(1.0, 20.0), target_motion="constant")
     poses = [(x, side * 9.4, 0.0) for x in (-3.0, -2.4, -1.8, -1.2, -0.6)]  # nearest to that slot
     batch.reset(options={"tracker_pose": poses, "target_pose": [0.0, side * 8.6, 0.0]})
-    rest = at_rest(batch)
-    observations, *_ = batch.step(rest)
+    observations, *_ = batch.step(np.full(batch.action_shape, (-1.0, 0.0)))
     views = batch.layout.views(observations)
     views["neighbour_age"][views["neighbour_number"] == 4] = 1.1
     away = away_from_slots(batch, features_of(batch, observations))[0, :4]
@@ -128,7 +120,7 @@ def slots_without_the_first_robot(**overrides: Any) -> list[int]:
     batch = posse.batch("constant", **overrides)
     places = [(5.0, 0.0), *batch.scenario.slot_offsets[1:]]
     batch.reset(options={"tracker_pose": [(*p, 0.0) for p in places], "target_pose": [0.0, 0.0, 0.0]})
-    observations, *_ = batch.step(at_rest(batch))
+    observations, *_ = batch.step(np.full(batch.action_shape, (-1.0, 0.0)))
     views = batch.layout.views(observations)
     views["neighbour_age"][views["neighbour_number"] == 0] = 1.1
     away = away_from_slots(batch, features_of(batch, observations))
