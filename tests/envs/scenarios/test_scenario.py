@@ -185,11 +185,6 @@ def test_slots_are_where_their_definition_says_and_apart(formation: str, number:
     np.testing.assert_allclose(places, slots(scenario), rtol=1e-9, atol=1e-9)
     between = np.abs(places[:, None] - places[None, :]) + np.diag(np.full(number, np.inf))
     assert between.min() > 2 * scenario.tolerance
-    if number > 1:
-        assert between.min() == pytest.approx(scenario.formation_spacing, rel=1e-6) or (formation == "ring")
-    assert np.abs(places).min() >= scenario.formation_distance - 1e-12
-    if formation != "ring":
-        assert places.real.max() <= -scenario.formation_distance + 1e-12, "behind the target"
 
 
 @pytest.mark.parametrize("formation", FORMATIONS)
