@@ -22,8 +22,7 @@ SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}
 
 
 def some_actions(shape: tuple[int, ...], steps: int) -> npt.NDArray[np.float32]:
-    draws = np.random.default_rng(3).uniform(-1, 1, (steps, *shape))
-    return draws.astype(np.float32)
+    return np.random.default_rng(3).uniform(-1, 1, (steps, *shape)).astype(np.float32)
 
 
 def act(carried: TensorDictBase, actions: npt.NDArray[np.float32]) -> TensorDictBase:
