@@ -32,14 +32,10 @@ def vector(name: str = "posse/Team-v0", **settings: Any) -> TeamVectorEnv:
 
 
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.value)
-@pytest.mark.parametrize(
-    ("name", "settings"),
-    [*((name, {**BUSY[name], "discrete_actions": discrete}) for name in BUSY for discrete in (False, True))],
-)
-def test_the_vector_environment_agrees_with_gymnasiums(
-    name: str, settings: dict[str, Any], mode: AutoresetMode
-) -> None:
-    name = f"posse/{name}-v0"
+@pytest.mark.parametrize("discrete", [False, True])
+@pytest.mark.parametrize("name", BUSY)
+def test_the_vector_environment_agrees_with_gymnasiums(name: str, discrete: bool, mode: AutoresetMode) -> None:
+    name, settings = f"posse/{name}-v0", {**BUSY[name], "discrete_actions": discrete}
     ours: Any = vector(name, autoreset=mode, **settings)
     makers = [partial(gymnasium.make, name, first_world=i, **settings) for i in range(E)]
     theirs: Any = SyncVectorEnv(makers, autoreset_mode=mode)
