@@ -126,10 +126,9 @@ def test_clipping_is_for_both_sides() -> None:
 def test_an_object_that_is_no_target_policy_is_refused() -> None:
     with pytest.raises(ValueError, match="exclude each other"):
         posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
-    with pytest.raises(TypeError, match="begin, act or restart"):
-        posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="begin, act or restart"):
-        posse.batch(SHORT, 1, target_policy=Weaver)  # type: ignore[arg-type]
+    for wrong in (3, Weaver):
+        with pytest.raises(TypeError, match="begin, act or restart"):
+            posse.batch(SHORT, 1, target_policy=wrong)  # type: ignore[arg-type]
     with pytest.raises(posse.ScenarioError, match="leaves nothing to move the target"):
         posse.PairedBatch(SHORT.replace(target_motion="agent"), 1, Crossing(), outside=1)
     for outside, words in (("tracker", "known: trackers, target"), (2, "not in the team"), (1.0, "whole number")):

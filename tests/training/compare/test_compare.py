@@ -128,10 +128,9 @@ def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytes
 
 def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(RunFolderError, match="not an empty folder"):
-        compare(Settings(("idle",), ("constant",), out=tmp_path))
-    with pytest.raises(RunFolderError, match="not an empty folder"):
-        compare(Settings(("idle",), ("constant",), out=tmp_path / "mine.txt"))
+    for out in (tmp_path, tmp_path / "mine.txt"):
+        with pytest.raises(RunFolderError, match="not an empty folder"):
+            compare(Settings(("idle",), ("constant",), out=out))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
