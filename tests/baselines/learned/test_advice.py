@@ -32,9 +32,8 @@ def test_an_adviser_that_its_name_does_not_make_again_is_refused() -> None:
 
 @pytest.mark.parametrize(("kind", "safeguard"), [("plain", False), ("features", True)])
 def test_an_answer_of_zero_is_the_adviser_itself(kind: str, safeguard: bool) -> None:
-    mine = play(worlds(), listener((0.0, 0.0), kind, safeguard), seed=3)
-    for name, values in play(worlds(), SCRIPT, seed=3).items():
-        np.testing.assert_array_equal(mine[name], values, err_msg=name)
+    mine, script = (play(worlds(), team, seed=3) for team in (listener((0.0, 0.0), kind, safeguard), SCRIPT))
+    np.testing.assert_equal(mine, script)
 
 
 def test_an_answer_is_twice_as_large_a_correction_and_leaves_the_message() -> None:

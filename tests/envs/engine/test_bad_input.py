@@ -157,8 +157,7 @@ def test_a_mask_that_chooses_no_world_starts_none() -> None:
     batch.restore(other.save())
     before = {name: array.copy() for name, array in batch.state.items()}
     batch.reset(seed=5, options={"reset_mask": np.zeros(2, np.bool_), "target_pose": [0.0, 0.0, 0.0]})
-    for name, array in batch.state.items():
-        np.testing.assert_array_equal(array, before[name], err_msg=name)
+    np.testing.assert_equal({**batch.state}, before)
 
 
 def test_bad_snapshots_and_copies() -> None:

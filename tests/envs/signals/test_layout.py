@@ -74,8 +74,7 @@ def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
     outputs: list[Any] = [together.reset()]
     expected: list[Any] = [np.concatenate([each.reset() for each in alone])]
     for step in range(40):  # past the horizon, where worlds start anew
-        for mine, theirs in zip(outputs, expected, strict=True):
-            np.testing.assert_array_equal(mine, theirs)
+        np.testing.assert_equal(outputs, expected)
         actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
         *outputs, infos = together.step(actions)
         outputs.append(infos["score"])

@@ -150,8 +150,7 @@ def file(tmp_path: Path) -> Path:
 def test_an_evaluation_is_the_same_alone_and_its_files_name_target_and_settings(file: Path, tmp_path: Path) -> None:
     many, few = (evaluate("ddcs-distributed", SHORT, count, 9, target=str(file), progress=False) for count in (5, 2))
     assert list(many) == list(few.columns)
-    for name, column in few.columns.items():
-        np.testing.assert_array_equal(column, many[name][:2], name)
+    np.testing.assert_equal({name: column[:2] for name, column in many.columns.items()}, few.columns)
     scripted = evaluate("ddcs-distributed", SHORT, 5, 9, progress=False)
     assert not np.array_equal(many["tracking_error"], scripted["tracking_error"])
     assert many.target == "evading"
