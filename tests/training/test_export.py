@@ -68,8 +68,7 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
     rows = Encoder(encoding, batch.layout, 6).encode(observations)
     actions = outputs_of(policy, rows, tmp_path).reshape(wanted.shape)
     if safeguard:
-        guard = Guard(batch.layout, 6)
-        actions = guard.actions(observations, actions)
+        actions = Guard(batch.layout, 6).actions(observations, actions)
     np.testing.assert_allclose(actions, wanted, rtol=0, atol=1e-5)
 
 
