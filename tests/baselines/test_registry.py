@@ -55,6 +55,7 @@ class Asking(Whole):
 def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "made_up_policies.py").write_text(MODULE)
     (tmp_path / "failing_policies.py").write_text("1 / 0")
+    (tmp_path / "exiting_policies.py").write_text("exit(3)")
     (tmp_path / "a:b").touch()
     monkeypatch.syspath_prepend(str(tmp_path))
     assert load("made_up_policies:Whole").name == "whole"
@@ -62,6 +63,7 @@ def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ("made_up_policies:Failing", "or created without arguments: LookupError: no weights"),
         ("made_up_policies:Asking", "or created without arguments: TypeError"),
         ("failing_policies:Any", "'failing_policies:Any' cannot be imported, or created.*: ZeroDivisionError"),
+        ("exiting_policies:Any", "'exiting_policies:Any' cannot be imported, or created.*: SystemExit: 3"),
         (str(tmp_path / "a:b"), "is not a policy file"),
     ):
         with pytest.raises(PolicyError, match=message):

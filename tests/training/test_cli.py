@@ -145,3 +145,5 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     assert json.loads((folder / "settings.json").read_text())["steps"] == steps_saved(folder) == 1600
     steps = [line.split(",")[0] for line in (folder / "curve.csv").read_text().splitlines()]
     assert steps == ["steps", "1280.0", "1600.0"], "no point twice"
+    assert main(arguments.split()) == 0
+    assert "1,600 steps are made already: none is added" in capsys.readouterr().out
