@@ -67,7 +67,7 @@ def test_the_vector_environment_agrees_with_gymnasiums(name: str, discrete: bool
 def test_settings_of_others_are_named_with_their_own() -> None:
     for other, own in (("num_worlds", "num_envs"), ("max_episode_steps", "horizon")):
         with pytest.raises(posse.ScenarioError, match=f"{other}= is not known here: it is {own}="):
-            vector(**{other: 2})
+            vector("posse/Team-v0", **{other: 2})
 
 
 def test_every_world_is_drawn() -> None:
