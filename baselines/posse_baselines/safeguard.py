@@ -35,7 +35,7 @@ class Guard(Minds):
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         scenario = layout.scenario
         super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
-        self.team.world["drifts"] = 0  # messages are the learner's own: no frames are measured by them
+        self.team.at["message_size"] = 0  # messages are the learner's own, and not those of the script
 
     def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.

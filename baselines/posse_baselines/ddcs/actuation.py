@@ -52,7 +52,8 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
 def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
     """List the discs that will be near when the command is executed; return their number.
 
-    Echoes are placed as if the robot had measured them there: elsewhere, delayed teams score less.
+    With a command delay, echoes are placed relative to the foreseen pose, though measured at the observed one: teams
+    scored more with that.
     """
     at, world, settings = team.at, team.world, team.settings
     count, two, radius = 0, 2.0 * world.radius, float(world.radius)

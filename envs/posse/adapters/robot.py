@@ -104,7 +104,7 @@ class Robot:
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
-        self._farthest = self.scenario.position_bound + self.scenario.drift_bound
+        self._farthest = float(self.layout.bounds()[1][self.layout.offsets["position"]])
         kept = self.scenario
         if kept.perfect_radio:  # such a world stores no messages, since they would equal the state
             kept = kept.replace(radio_loss=_BARELY_LOSSY)

@@ -233,7 +233,7 @@ def _misfits(s: TrainSettings) -> Iterator[str]:
     for name in ("hidden", "team_sizes"):
         value = getattr(s, name)
         if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):
-            yield f"{name}={value!r:.80} is invalid: it must be whole numbers of at least 1, as 64,64"
+            yield f"{name}={value!r:.80} is invalid: it must be whole numbers of at least 1, such as 64,64"
 
 
 def _conflicts(s: TrainSettings) -> Iterator[str]:
