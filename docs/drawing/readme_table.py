@@ -26,7 +26,7 @@ PLAYS_AHEAD: Final = "belief-planner"
 
 
 def table() -> str:
-    """Return the table: baseline, the best team of each kind, and the planners."""
+    """Return the table: baseline, a team of each kind (the one trained there, else the best), and the planners."""
     kinds = "best script | belief planner | learned from nothing | learned correction | planner"
     lines = [f"| scenario | baseline, `{BASELINE}` | {kinds} |", "|---|---|---|---|---|---|---|"]
     corrects = {name: LearnedPolicy.from_file(path).adviser is not None for name, path in shipped().items()}
@@ -35,6 +35,7 @@ def table() -> str:
         if not found:
             continue
         teams = [name for name, r in found.items() if name in policy_names() and not standings.is_reference(r)]
+        teams.sort(key=lambda name: name not in (f"learned-{scenario}", f"corrected-{scenario}"))  # those first
         script, nothing, correction = (
             _cell(found, next((name for name in teams if corrects.get(name) is kind), ""))
             for kind in (None, False, True)
