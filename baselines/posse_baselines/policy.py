@@ -154,7 +154,7 @@ class from_function(BasePolicy):  # noqa: N801 (used as a function is)
         """Return the function's actions, (E, N, 2 + m), and the memory; ValueError if they have another shape."""
         found = np.asarray(self._function(observations))
         team, length = observations.shape[:2], 2 + memory.scenario.message_size
-        own = found.shape[-1] if found.shape[-1:] in ((2,), (2 + self.message_size,)) else length
+        own = found.shape[-1] if found.shape[-1:] in ((2,), (length,)) else 2 + self.message_size
         shape = team if self._discrete else (*team, own)
         chosen = as_motions(f"what the function of policy {self.name!r} returned", found, shape, self._discrete)
         actions = np.zeros((*team, length), np.float32)

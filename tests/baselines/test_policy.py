@@ -176,7 +176,7 @@ def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy)
         policy.begin(posse.batch("constant", message_size=2).layout, 1)
 
 
-def test_the_script_refuses_a_sensor_of_bearings_alone(request: pytest.FixtureRequest) -> None:
+def test_only_pursuit_plays_with_bearings_alone(request: pytest.FixtureRequest) -> None:
     request.addfinalizer(lambda: posse.SENSORS.pop("by-bearing"))  # commands would tell the user to import this module
 
     @posse.sensor("by-bearing", fix="bearing")
@@ -184,10 +184,12 @@ def test_the_script_refuses_a_sensor_of_bearings_alone(request: pytest.FixtureRe
         """In sight everywhere."""
         return True
 
-    layout = posse.ObservationLayout(posse.get_scenario("smart", sensor="by-bearing", message_size=5))
-    for name in ("ddcs-tuned", "belief-planner"):
+    batch = posse.batch("constant", 9, sensor="by-bearing", message_size=5, horizon=100)
+    for name in ("ddcs-tuned", "belief-planner", "corrected-smart", "learned-smart"):
         with pytest.raises(PolicyError, match="sensor='by-bearing' measures bearings alone"):
-            load(name).begin(layout, 1)
+            load(name).begin(batch.layout, 1)
+    distances = [rollout(batch, load(name)).metrics["tracking_error"].mean() for name in ("idle", "pursuit")]
+    assert distances[1] < 0.6 * distances[0]
 
 
 @pytest.mark.parametrize("name", ["learned-radio", "ddcs-distributed"])

@@ -30,7 +30,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from posse import SENSORS, ObservationLayout, Scenario
+from posse import ObservationLayout, Scenario
 from posse.numeric import FloatArray, Record, Records, compiled, kernel
 from posse_baselines.ddcs.actuation import correct, execute_safely, surround
 from posse_baselines.ddcs.memory import Minds, Team, is_due, pair, unit_of
@@ -94,11 +94,7 @@ class DDCS(BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start; PolicyError if the scenario does not fit."""
         super().begin(layout, num_worlds)
-        scenario = layout.scenario
-        if SENSORS[scenario.sensor].fix == "bearing":
-            why = f"sensor={scenario.sensor!r} measures bearings alone"
-            raise PolicyError(f"policy {self.name!r} follows positions of the target, and {why}: choose another sensor")
-        return Minds(layout, self.settings_for(scenario), num_worlds, scenario.num_trackers)
+        return Minds(layout, self.settings_for(layout.scenario), num_worlds, layout.scenario.num_trackers)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) of every team: :meth:`propose` and :meth:`carry_out` in one."""

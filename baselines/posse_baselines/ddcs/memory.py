@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse import ObservationLayout, Scenario
+from posse import SENSORS, ObservationLayout, Scenario
 from posse.declarations import FIELDS
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Record, Records, compiled, over_worlds, record_type
 from posse.rules import beam_directions
@@ -241,6 +241,9 @@ class Minds(OwnArrays):
         if layout.scenario.command_delay > _MOST_WAITING:
             least = f"at most {_MOST_WAITING}: a longer control_step makes it fewer steps"
             raise PolicyError(f"the DDCS foresees no command_delay={layout.scenario.command_delay}, but {least}")
+        if SENSORS[layout.scenario.sensor].fix == "bearing":
+            why = f"sensor={layout.scenario.sensor!r} measures bearings alone"
+            raise PolicyError(f"the DDCS and its safeguard need positions of the target, and {why}: choose another one")
         cosines, sines = beam_directions(layout.scenario)
         self.team = Team(
             offsets_of(layout),

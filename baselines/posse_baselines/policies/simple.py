@@ -61,7 +61,7 @@ class Pursuit(BasePolicy):
         layout: ObservationLayout = memory
         s = layout.scenario
         v = layout.views(check_observations(observations, (len(observations), s.num_trackers), layout))
-        fix = v["target_range"][..., None] * v["target_bearing"]
+        fix = np.abs(v["target_range"])[..., None] * v["target_bearing"]  # -1: of a bearing alone
         x, y = np.moveaxis(fix + np.maximum(v["target_age"], 0.0)[..., None] * v["target_velocity"], -1, 0)
         known, bearing = v["target_known"] > 0, np.arctan2(y, x)
         turn = np.where(known, bearing / (2.0 * s.control_step * v["max_turn_rate"]), 0.2)

@@ -132,7 +132,7 @@ class Scenario:
 
     # Time
     control_step: float = setting(0.1, "between two actions; a whole multiple of physics_step", "s", 1e-4, 100)
-    physics_step: float = setting(0.05, "between two contact checks", "s", 1e-4, 100)
+    physics_step: float = setting(0.05, "between two checks of what blocks a robot", "s", 1e-4, 100)
     horizon: int = setting(600, "control steps in an episode", "steps", 1, 1_000_000)
     terminate_on_contact: bool = setting(False, "whether the episode ends when any tracker touches anything")
 

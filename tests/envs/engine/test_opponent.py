@@ -64,6 +64,9 @@ def test_it_plays_as_a_batch_whose_other_side_is_driven_from_outside(side: str, 
         mine, rewards, _, truncated, infos = inside.step(action)
         theirs, gained, _, ended, told = outside.step(whole)
         np.testing.assert_array_equal(rewards, gained[:, own])
+        np.testing.assert_array_equal(inside.everyone[0], whole)
+        np.testing.assert_array_equal(inside.everyone[1].observations, theirs)
+        np.testing.assert_array_equal(inside.everyone[1].rewards, gained)
         np.testing.assert_array_equal(truncated, ended)
         np.testing.assert_array_equal(infos["reward/slot"], told["reward/slot"][:, own])
         if autoreset == "same_step" and truncated.any():
