@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 from safetensors.numpy import load_file
+from tests.support.learned import policy_for
 from tests.support.runs import HORIZON, killed_at, quiet
 
+import posse
 from posse_baselines.registry import shipped
 from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
@@ -76,8 +78,14 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
     assert more.cells["idle", "smart"]["score"].count == 2, "what is no training may be changed"
     with pytest.raises(SettingsError, match="unknown setting 'foo'"):
         play_league(tiny(tmp_path / "new", training={"foo": 1}), console=quiet())
-    with pytest.raises(SettingsError, match="num_worlds=1 leaves 0 for a share"):
+    with pytest.raises(SettingsError, match="num_worlds=1 is too few for 3 opponents"):
         play_league(tiny(tmp_path / "new", scenario="search", targets=("smart", "slow"), training={"num_worlds": 1}))
+    with pytest.raises(SettingsError, match="num_worlds=20 is too few for 10 opponents in the end: use 23"):
+        play_league(tiny(tmp_path / "new", generations=9, training={"num_worlds": 20}), console=quiet())
+    tested = policy_for(posse.batch("smart").layout).with_card({"name": "tested", "trained_splits": ("train", "test")})
+    tested.save(tmp_path / "tested.safetensors")
+    with pytest.raises(SettingsError, match="was trained on the split 'test'"):
+        play_league(tiny(tmp_path / "new", teams=(str(tmp_path / "tested.safetensors"),)), console=quiet())
     assert not (tmp_path / "new").exists()
     assert League(tiny(tmp_path, scenario="search"), quiet()).training("trackers", tmp_path, "smart").algorithm == "ppo"
     held = json.loads((tmp_path / "league.json").read_text())

@@ -73,8 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     module, _, function = COMMANDS[name][1].partition(":")
     try:
         options = [word.partition("=")[0].replace("_", "-") for word in rest if word.startswith("--")]
-        for option in options:
-            if options.count(option) > 1:
+        bare = [option.replace("--no-", "--", 1) for option in options]
+        for option in bare:
+            if bare.count(option) > 1:
                 raise UserError(f"{option} is given twice: give it once, with all its values behind it")
         run: Callable[[list[str]], Any] = getattr(
             importlib.import_module(f"posse_training.{module}"), function or "main"

@@ -44,8 +44,17 @@ def locked(folder: Path) -> Iterator[None]:
 
 def check_new(out: Path) -> None:
     """Raise if a folder is neither new nor empty."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if out.exists() and (not out.is_dir() or any(path.name != _LOCK for path in out.iterdir())):
         raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
+
+
+@contextlib.contextmanager
+def held_new(out: Path) -> Iterator[None]:
+    """Hold a folder that is new or empty (:func:`check_new`), as :func:`locked` does; no lock is left in it."""
+    check_new(out)
+    with locked(out):
+        yield
+        (out / _LOCK).unlink()
 
 
 @contextlib.contextmanager

@@ -129,6 +129,8 @@ def film(
         every = max(every, math.ceil(0.02 * speed / settings.control_step - 1e-9))
         if every * settings.control_step / speed > 655:
             raise SettingsError(f"speed={speed!r} is too low for a GIF, whose frames are shown for at most 655 s")
+    elif speed > 1000 * every * settings.control_step:
+        raise SettingsError(f"speed={speed!r} is too high for an MP4, which shows at most 1,000 frames/s")
     given = (560 if len(policies) == 1 else 400) if size is None else size
     width, height = (given, given) if isinstance(given, int) else (given[0] // len(policies), given[1])
     if min(width, height) < LEAST_SIZE or max(width * len(policies), height) > _LARGEST:

@@ -21,8 +21,8 @@ from posse_baselines import Policy, load, policy_names
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import FILES, is_code
 from posse_training.errors import SettingsError
-from posse_training.evaluation.evaluation import evaluate, played_errors
-from posse_training.files import check_new
+from posse_training.evaluation.evaluation import evaluate, played_errors, prepare
+from posse_training.files import held_new
 from posse_training.provenance import commit
 
 __all__ = ["Standing", "read_standings", "submit", "verify"]
@@ -154,14 +154,13 @@ def submit(
     text = Path(policy).name if is_file else policy
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
-    get_scenario(scenario)  # a family has no standings
-    check_new(out)
-    out.mkdir(parents=True, exist_ok=True)
-    with played_errors():
-        claim = measure(label, text, loaded, scenario, episodes, SEED)
-    if is_file:
-        write_atomically(out / text, content)
-    write_atomically(out / CLAIM, standings_text([claim]).encode())
+    prepare(loaded, get_scenario(scenario), episodes, SEED)  # a family has no standings
+    with held_new(out):
+        with played_errors():
+            claim = measure(label, text, loaded, scenario, episodes, SEED)
+        if is_file:
+            write_atomically(out / text, content)
+        write_atomically(out / CLAIM, standings_text([claim]).encode())
     return claim
 
 

@@ -16,11 +16,13 @@ from rich.table import Table
 from rich.text import Text
 
 from posse import get_scenario
+from posse_baselines import load, load_target
 from posse_baselines.fields import number
 from posse_baselines.files import read_json, write_json
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.registry import is_code
 from posse_training.errors import SettingsError, check_settings, require
+from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
@@ -259,8 +261,13 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
     from posse_training.train.train import check_before  # torch
 
     found = League(settings, console or Console())
-    for side, others in ((TARGET, settings.teams), (TEAM, settings.targets)):
-        check_before(found.training(side, settings.path, ",".join(others)))
+    for side, others, read in ((TARGET, settings.teams, load), (TEAM, settings.targets, load_target)):
+        for other in others:
+            refuse_trained_split(read(other), "test")
+        check_before(first := found.training(side, settings.path, ",".join(others)))
+        met = len(others) + settings.generations  # by the last of the side, in so many parts of the worlds at most:
+        if first.num_worlds < (parts := met + _SHARES + met // 2):
+            raise SettingsError(f"num_worlds={first.num_worlds} is too few for {met} opponents in the end: use {parts}")
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))

@@ -41,7 +41,7 @@ from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.fields import changed
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.steering import Work, work_of
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError
+from posse_baselines.policy import Annotations, BasePolicy, Memory
 
 BASELINE: Final = Settings(
     model="centralized",

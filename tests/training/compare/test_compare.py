@@ -11,6 +11,7 @@ from tests.support.learned import policy_for, target_for
 
 import posse
 from posse.scenarios.named import SCENARIOS
+from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
@@ -20,6 +21,8 @@ from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation.statistics import difference
+from posse_training.files import locked
+from posse_training.leaderboard import submit
 
 ALONE: dict[str, Any] = {"figures": False, "planner_episodes": 0}
 
@@ -94,6 +97,8 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
     assert found.rows[1]["difference"] == difference(scores, reference)
     better = (scores > reference) + 0.5 * (scores == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
+    with pytest.raises(PolicyError, match="names a policy twice"):
+        compare(Settings((f"two={files[0]},{tmp_path}/../{tmp_path.name}/0.safetensors",), ("constant",), 1))
 
 
 def test_a_policy_that_cannot_play_is_left_out_with_a_line(
@@ -132,6 +137,10 @@ def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> Non
         with pytest.raises(RunFolderError, match="not an empty folder"):
             compare(Settings(("idle",), ("constant",), out=out))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+    with locked(tmp_path / "busy"):
+        for play in (lambda out: compare(Settings(("idle",), ("constant",), out=out)), lambda out: submit("idle", out)):
+            with pytest.raises(RunFolderError, match="in use by process"):
+                play(tmp_path / "busy")
 
 
 # --- against a given target -----------------------------------------------------------------------

@@ -11,6 +11,7 @@ import posse
 from posse_baselines import from_function
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
+from posse_training.errors import SettingsError
 from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
@@ -21,6 +22,13 @@ def test_a_split_that_a_policy_was_trained_on_is_refused() -> None:
     policy.trained_splits = ("train", "validation")
     with pytest.raises(ValueError, match="'trained' was trained on the split 'validation'"):
         evaluate(policy, "constant", 1, split="validation", **FAST)
+
+
+def test_scores_are_of_whole_episodes() -> None:
+    settings: dict[str, Any] = {"progress": False, "start_distance": (0.6, 2.0)}
+    plain, ending = (evaluate("random", "smart", 20, terminate_on_contact=ends, **settings) for ends in (False, True))
+    assert plain["contact_free"].min() == 0.0
+    np.testing.assert_array_equal(plain["safe_score"], ending["safe_score"])
 
 
 @pytest.mark.parametrize("reads", [False, True])
@@ -53,6 +61,8 @@ def test_worlds_of_a_drawn_scenario_are_resampled_as_one() -> None:
 def test_the_interval_of_a_share_of_all_has_a_width(tmp_path: Path) -> None:
     (results := evaluate("idle", "constant", 10, start_distance=(9.0, 10.0), **FAST)).write(str(tmp_path / "all.csv"))
     assert results.estimate("contact_free").low == pytest.approx(10 / (10 + 1.96**2), abs=1e-3)  # Wilson's, of 10 in 10
+    with pytest.raises(SettingsError, match=r"must end in \.csv"):
+        results.write(tmp_path / "all.json")
 
 
 def test_episodes_in_which_it_never_happened_do_not_count() -> None:

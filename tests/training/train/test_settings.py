@@ -1,5 +1,6 @@
 """Training settings: checked before a run folder is made, and read from files without code."""
 
+import importlib
 import json
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 from tests.support.runs import resume
 
 import posse
+from posse.declarations import FIELDS
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.algorithms import ALGORITHMS
@@ -32,6 +34,17 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
 )
 def test_the_scenario_decides_on_the_algorithm(scenario: str, side: str, algorithm: str) -> None:
     assert default_settings(scenario, side=side).algorithm == algorithm
+
+
+def test_a_run_holds_the_code_of_its_rules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    text = 'import posse\n\n\n@posse.field("1", 0, 9)\ndef gauge(c):\n    """One."""\n    return 1.0\n'
+    (tmp_path / "gauges.py").write_text(text)
+    importlib.import_module("gauges")
+    held = TrainSettings(scenario="constant", overrides={"extra_fields": ("gauge",)}).held()
+    FIELDS.pop("gauge")
+    assert len(held["digest of gauges"]) == 64
+    assert "digest of gauges" not in TrainSettings(scenario="constant").held()
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.support.learned import target_for
 from tests.support.runs import HORIZON, TARGET, numbers, quiet, small
 
+import posse
 from posse_baselines import load_target
 from posse_training import evaluate
 from posse_training.errors import RunFolderError, SettingsError
@@ -47,6 +49,14 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
             train(replace(other, folder=tmp_path / "third"), console=quiet())
     shutil.rmtree(tmp_path / "first")
     train(second, console=quiet())  # resumed, it needs no start
+
+
+def test_an_opponent_that_was_trained_on_validation_worlds_is_refused(tmp_path: Path) -> None:
+    seen = {"name": "seen", "side": "target", "trained_splits": ("train", "validation")}
+    target_for(posse.get_scenario("constant")).with_card(seen).save(tmp_path / "seen.safetensors")
+    with pytest.raises(SettingsError, match="'seen' was trained on the split 'validation'"):
+        train(small(tmp_path / "run", target=str(tmp_path / "seen.safetensors")), console=quiet())
+    assert not (tmp_path / "run").exists()
 
 
 def test_an_opponent_whose_memory_is_not_restored_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,8 +60,10 @@ def main(arguments: Sequence[str]) -> None:
 
     from posse import get_scenario
     from posse_baselines import load, load_target
+    from posse_training.evaluation.episodes import refuse_two_targets
 
     scenario = get_scenario(which.scenario, **which.overrides)
+    refuse_two_targets(which.target, which.overrides)
     target = None if which.target is None else load_target(which.target)
     if target is not None:
         scenario = scenario.replace(target_motion=target.motion)

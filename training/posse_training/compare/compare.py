@@ -26,7 +26,7 @@ from posse_baselines.registry import is_code
 from posse_training.compare.contenders import PLANNER, Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, check_settings, require
-from posse_training.evaluation.episodes import refuse_trained_split
+from posse_training.evaluation.episodes import refuse_trained_split, refuse_two_targets
 from posse_training.evaluation.evaluation import (
     FAILURES,
     Evaluation,
@@ -40,7 +40,7 @@ from posse_training.evaluation.evaluation import (
 )
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import check_new
+from posse_training.files import check_new, held_new
 from posse_training.options import Changes, Ray, words_of
 from posse_training.provenance import commit
 from posse_training.replay import join, record, write_replay
@@ -124,6 +124,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> "Compariso
             stack.enter_context(found.played_on_ray(settings.ray, report))
             bar.reset(task, total=len(scenarios) * len(contenders))
         found.folder = _new_folder(settings.out)
+        stack.enter_context(held_new(found.folder))
         for scenario in scenarios:
             found.play(scenario, lambda what: bar.update(task, description=what, advance=1))
         found.write()
@@ -132,6 +133,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> "Compariso
 
 def _checked(settings: Settings) -> list[Scenario | Family]:
     check_settings(settings)
+    refuse_two_targets(settings.target, settings.overrides)
     if not settings.scenario:
         raise SettingsError("no scenario is given: name one or several, or all")
     names = [each for name in settings.scenario for each in (scenario_names() if name == "all" else (name,))]

@@ -1,6 +1,7 @@
 """Contenders of a comparison: one policy, or one policy for each of several training seeds."""
 
 import contextlib
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -58,7 +59,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
             who = "the reference and another policy" if label == PLANNER else "two policies"
             raise PolicyError(f"{who} have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
-        if len(set(names)) < len(names):
+        if len({os.path.realpath(name) if is_file(name) else name for name in names}) < len(names):
             raise PolicyError(f"{text!r:.120} names a policy twice: give each training seed once")
         policies = tuple(name if is_code(name) else load(name) for name in names)
         for name in filter(is_code, names):

@@ -1,6 +1,6 @@
 """One episode in every world of a batch, measured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from posse import Family, Scenario
@@ -16,9 +16,15 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
         raise SettingsError(
-            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be biased: choose "
-            f"another of 'train', 'validation', 'test' than {', '.join(map(repr, trained))}"
+            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be biased: name "
+            f"another, or choose another split than {', '.join(map(repr, trained))}"
         )
+
+
+def refuse_two_targets(target: object, overrides: Mapping[str, Any]) -> None:
+    """Raise if a target is given, and the motion of the scenario's own one, too."""
+    if target is not None and (motion := overrides.get("target_motion")) is not None:
+        raise SettingsError(f"target_motion={motion!r} and a target exclude each other: leave one out")
 
 
 class Match(NamedTuple):

@@ -19,7 +19,7 @@ from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, describe
-from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split
+from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split, refuse_two_targets
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
@@ -43,6 +43,8 @@ def evaluate(
 ) -> Results:
     """Play episodes of a scenario with a policy, here or on a Ray cluster, with the same result.
 
+    Episodes go on after a contact, whatever ``terminate_on_contact`` says.
+
     Args:
         policy: A policy, or an argument of :func:`posse_baselines.load`.
         scenario: A scenario, a family (:func:`posse.family`), or the name of one; ten worlds in a row of a family
@@ -58,13 +60,15 @@ def evaluate(
         **overrides: Settings of the scenario.
 
     Raises:
-        SettingsError: ``episodes`` no whole number of at least 1, or a split that policy or target was trained on.
+        SettingsError: ``episodes`` no whole number of at least 1, a split that policy or target was trained on, or
+            both a target and a ``target_motion``.
         PolicyError: An unknown policy or target, or one that does not fit; TypeError for what is none.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
         MissingExtraError: Ray is to be used and not installed.
         ClusterError: There is no such cluster, or one of its nodes has other versions.
         PlayError: The policy failed on the cluster, or its workers died again and again.
     """
+    refuse_two_targets(target, overrides)
     given = scenario_or_family(scenario, **overrides)
     one = prepare(policy, given, episodes, seed, target=target, split=split)
     with progress_bar(disable=not progress) as bar:
@@ -122,7 +126,8 @@ def prepare(
         if player is not None:
             refuse_trained_split(player, split)
     scenario = scenario if opponent is None else scenario.replace(target_motion=opponent.motion)
-    scenario = scenario.replace(message_size=max(scenario.message_size, loaded.message_size))
+    size = max(scenario.message_size, loaded.message_size)
+    scenario = scenario.replace(message_size=size, terminate_on_contact=False)  # scores are of whole episodes
     first, _ = next(blocks(scenario, range(1), 0, "train"))
     batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))

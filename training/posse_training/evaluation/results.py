@@ -11,6 +11,7 @@ import numpy.typing as npt
 from posse import Family, Scenario
 from posse.scenarios.family import BLOCK
 from posse_baselines.files import write_json
+from posse_training.errors import SettingsError
 from posse_training.evaluation.statistics import Estimate, mean, share
 from posse_training.files import write_csv
 
@@ -85,9 +86,12 @@ class Results:
         """Write the rows as CSV and the settings as a JSON file of the same name.
 
         Raises:
+            SettingsError: A path that does not end in ``.csv``.
             OSError: A file could not be written; an old one of that name is unchanged.
         """
         path = Path(path)
+        if path.suffix != ".csv":
+            raise SettingsError(f"path={str(path)!r} must end in .csv: the settings are written beside it as .json")
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = self.rows()
         write_csv(path, rows)

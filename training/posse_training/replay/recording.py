@@ -14,6 +14,7 @@ from posse.declarations import Declarations
 from posse_baselines import Policy, Target, Trajectory, batch_for, load, load_target, rollout
 from posse_baselines.ddcs import TASKS
 from posse_training.errors import SettingsError
+from posse_training.evaluation.episodes import refuse_two_targets
 from posse_training.evaluation.evaluation import played_errors
 from posse_training.options import settings_of, words_of
 from posse_training.provenance import commit
@@ -56,6 +57,7 @@ def record(
         PolicyError, ScenarioError: An argument that is unknown, invalid, or does not fit the scenario.
         PlayError: A policy that raised, or returned invalid actions.
     """
+    refuse_two_targets(target, overrides)
     settings = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)
     if seconds is not None and not seconds > 0:

@@ -11,13 +11,15 @@ from typing import Annotated, Any, Final, Literal, Self
 import tyro
 
 from posse import Family, Scenario, ScenarioError
+from posse.declarations import Declarations
 from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, load
 from posse_baselines.fields import number
 from posse_baselines.files import read_json
+from posse_baselines.policies.scripted import SCRIPTED
 from posse_training.errors import SettingsError, check_settings
 from posse_training.options import Changes, MaybeNames, Names, Pairs
-from posse_training.provenance import digests
+from posse_training.provenance import digests, sources
 
 Point = dict[str, float]
 """Of a learning curve, by the columns of ``curve.csv``: agent steps, s, mean safe score and its 95 % interval, mean
@@ -202,8 +204,11 @@ class TrainSettings:
         return {**dataclasses.asdict(self), "folder": None}
 
     def held(self) -> dict[str, Any]:
-        """Return what must be the same when a run is resumed: the settings, and the versions of the scenarios."""
-        return {**self.to_dict(), "versions": [each.version for each in self.given], **digests(self.opponents)}
+        """Return what must be the same when a run is resumed: settings, versions and digests of code that it uses."""
+        bases = [each.base if isinstance(each, Family) else each for each in self.given]
+        modules = {name: sources(name) for base in bases for name in Declarations.of(base).modules}
+        rules = {f"digest of {name}": digest for name, digest in modules.items()}
+        return {**self.to_dict(), "versions": [base.version for base in bases], **rules, **digests(self.opponents)}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -230,6 +235,8 @@ def _misfits(s: TrainSettings) -> Iterator[str]:
     for name in ("overrides", "reward_weights"):
         if not isinstance(value := getattr(s, name), dict):
             yield f"{name}={value!r:.80} is invalid: it must map names to values"
+    if s.advise is not None and s.advise not in SCRIPTED:  # settings that are read run no code
+        yield f"advise={s.advise!r:.80} is no script of the package, such as ddcs-tuned"
     for name in ("hidden", "team_sizes"):
         value = getattr(s, name)
         if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):

@@ -10,6 +10,7 @@ from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
 from posse_training.errors import SettingsError
+from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import TeamVecEnv
@@ -32,6 +33,7 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
     """Return every scenario with every opponent.
 
     Raises:
+        SettingsError: An opponent that was trained on validation worlds.
         PolicyError: An unknown opponent, one that does not move the other side, or one whose memory cannot be saved,
             as resuming requires.
     """
@@ -55,6 +57,7 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
                     f"{name!r} cannot be trained against: it reads the state of the worlds, or its memory cannot be "
                     "saved (it has no method arrays)"
                 )
+            refuse_trained_split(opponent, "validation")
             found.append(Pairing(faced, opponent, {} if policy is None else {argument: policy}, share))
     return tuple(found)
 
