@@ -31,7 +31,7 @@ SHORTER = {
     r"^posse demo$": r"posse demo --episodes 2 --seconds 1",
     r"^posse train .*": r"\g<0> --steps 512 --num-worlds 19 --rollout 16 --minibatch 64 --evaluate-worlds 2",
     r"^posse league .*$": r"\g<0> --generations 1 --target-steps 256 --team-steps 256"
-    " --episodes 2 --training num_worlds=16 evaluate_worlds=2",
+    " --episodes 2 --training num_worlds=24 evaluate_worlds=2",
     "generation-04": "generation-01",
     r"^posse compare (?!.*--scenario).*$": r"\g<0> --scenario smart",
     r"^posse compare .*$": r"\g<0> --episodes 2 --no-figures --planner-episodes 0",

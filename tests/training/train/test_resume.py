@@ -54,11 +54,11 @@ train(TrainSettings.from_dict(json.loads(sys.argv[1])))
 
 @pytest.mark.long
 def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
-    settings = small(tmp_path / "whole", steps=4800, evaluate_every=2400, checkpoint_every=800)
+    settings = small(tmp_path / "whole", steps=12_000, evaluate_every=6000, checkpoint_every=800)
     train(settings, console=quiet())
     folder = tmp_path / "killed"
     command = [sys.executable, "-c", SCRIPT, json.dumps({**settings.to_dict(), "folder": str(folder)})]
-    for target in (800, 2400):
+    for target in (800, 4000):
         running, reached = subprocess.Popen(command), 0
         while reached < target:
             assert running.poll() is None
