@@ -49,10 +49,10 @@ def installed() -> str:
     return ", ".join(f"{name} {value}" for name, value in versions.items())
 
 
-def digests(policies: Iterable[str]) -> dict[str, str]:
-    """Return ``digest of NAME`` of each loaded policy that is a file or code: a run goes on with the same ones."""
-    loaded = {name: getattr(sys.modules[name.split(":")[0]], "__file__", "") for name in policies if is_code(name)}
-    files = {name: Path(loaded.get(name, name) or "") for name in policies}
+def digests(names: Iterable[str]) -> dict[str, str]:
+    """Return ``digest of NAME`` of each that is a file, or ``module:WHAT`` and loaded: a run goes on with the same."""
+    loaded = {name: getattr(sys.modules[name.split(":")[0]], "__file__", "") for name in names if is_code(name)}
+    files = {name: Path(loaded.get(name, name) or "") for name in names}
     contents = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
     return {f"digest of {name}": hashlib.sha256(content).hexdigest()[:12] for name, content in contents.items()}
 

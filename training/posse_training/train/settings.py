@@ -19,7 +19,7 @@ from posse_baselines.files import read_json
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_training.errors import SettingsError, check_settings
 from posse_training.options import Changes, MaybeNames, Names, Pairs
-from posse_training.provenance import digests, sources
+from posse_training.provenance import digests
 
 Point = dict[str, float]
 """Of a learning curve, by the columns of ``curve.csv``: agent steps, s, mean safe score and its 95 % interval, mean
@@ -206,9 +206,8 @@ class TrainSettings:
     def held(self) -> dict[str, Any]:
         """Return what must be the same when a run is resumed: settings, versions and digests of code that it uses."""
         bases = [each.base if isinstance(each, Family) else each for each in self.given]
-        modules = {name: sources(name) for base in bases for name in Declarations.of(base).modules}
-        rules = {f"digest of {name}": digest for name, digest in modules.items()}
-        return {**self.to_dict(), "versions": [base.version for base in bases], **rules, **digests(self.opponents)}
+        rules = {f"{name}:rules" for base in bases for name in Declarations.of(base).modules}
+        return {**self.to_dict(), "versions": [base.version for base in bases], **digests([*self.opponents, *rules])}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
