@@ -85,7 +85,8 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "not an empty folder" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
     assert cli.main(["submit", "pursuit", "--scenario", "family-open", "--out", str(tmp_path / "sent")]) == 2
-    assert not (tmp_path / "sent").exists()
+    assert cli.main(["submit", "tests.support.bad_policies:Raises", "--out", str(tmp_path / "failed")]) == 2
+    assert {path.name for path in tmp_path.rglob("*")} == {"kept.txt", "failed"}, "nothing in it, and no lock"
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:

@@ -53,8 +53,10 @@ def held_new(out: Path) -> Iterator[None]:
     """Hold a folder that is new or empty (:func:`check_new`), as :func:`locked` does; no lock is left in it."""
     check_new(out)
     with locked(out):
-        yield
-        (out / _LOCK).unlink()
+        try:
+            yield
+        finally:
+            (out / _LOCK).unlink()
 
 
 @contextlib.contextmanager

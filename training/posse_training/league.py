@@ -265,9 +265,9 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         for other in others:
             refuse_trained_split(read(other), "test")
         check_before(first := found.training(side, settings.path, ",".join(others)))
-        met = len(others) + settings.generations  # by the last of the side, in so many parts of the worlds at most:
-        if first.num_worlds < (parts := met + _SHARES + met // 2):
-            raise SettingsError(f"num_worlds={first.num_worlds} is too few for {met} opponents in the end: use {parts}")
+        met = len(others) + settings.generations  # by the last member of the side
+        if first.num_worlds < (most := met + _SHARES + met // 2):  # parts, as shares() rounds them
+            raise SettingsError(f"num_worlds={first.num_worlds} is too few for {met} opponents in the end: use {most}")
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))

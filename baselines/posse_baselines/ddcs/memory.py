@@ -243,7 +243,7 @@ class Minds(OwnArrays):
             raise PolicyError(f"the DDCS foresees no command_delay={layout.scenario.command_delay}, but {least}")
         if SENSORS[layout.scenario.sensor].fix == "bearing":
             why = f"sensor={layout.scenario.sensor!r} measures bearings alone"
-            raise PolicyError(f"the DDCS and its safeguard need positions of the target, and {why}: choose another one")
+            raise PolicyError(f"DDCS and safeguard need positions of the target, and {why}: choose another sensor")
         cosines, sines = beam_directions(layout.scenario)
         self.team = Team(
             offsets_of(layout),

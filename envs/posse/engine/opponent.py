@@ -98,17 +98,14 @@ class PairedBatch(Batch):
 
         If the policy's actions are invalid, neither the worlds nor its memory change.
         """
+        whole, came = self.everyone
         if orders is None:
             whole, self.memory = self._with_theirs(actions)
-        else:
-            whole = np.zeros_like(self.everyone[0])  # not read
         observations, rewards, terms = (np.empty_like(array) for array in self.everyone[1][:3])
         every = results._replace(observations=observations, rewards=rewards, terms=terms)
         over = super()._advance(whole, every, orders)
-        if orders is None:
-            self.everyone = whole, every
-        else:  # an order replaces what is observed, not what came of the last step
-            self.everyone = self.everyone[0], self.everyone[1]._replace(observations=observations)
+        # Other orders replace what is observed, not what came of the last step.
+        self.everyone = whole, every if orders is None else came._replace(observations=observations)
         for mine, array in zip(results[:3], every[:3], strict=True):
             mine[...] = array[:, self._mine]
         return over

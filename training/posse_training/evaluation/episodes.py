@@ -17,7 +17,7 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
     if split in trained:
         raise SettingsError(
             f"{policy.name!r} was trained on the split {split!r}, so that its score there would be biased: name "
-            f"another, or choose another split than {', '.join(map(repr, trained))}"
+            f"another policy, or another split than {', '.join(map(repr, trained))}"
         )
 
 
