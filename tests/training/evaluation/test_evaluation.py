@@ -61,6 +61,7 @@ def test_worlds_of_a_drawn_scenario_are_resampled_as_one() -> None:
 def test_the_interval_of_a_share_of_all_has_a_width(tmp_path: Path) -> None:
     (results := evaluate("idle", "constant", 10, start_distance=(9.0, 10.0), **FAST)).write(str(tmp_path / "all.csv"))
     assert results.estimate("contact_free").low == pytest.approx(10 / (10 + 1.96**2), abs=1e-3)  # Wilson's, of 10 in 10
+    assert "idle on constant: safe score 0.000 [0.000, 0.000], 10 episodes" in repr(results)
     with pytest.raises(SettingsError, match=r"must end in \.csv"):
         results.write(tmp_path / "all.json")
 

@@ -1,7 +1,7 @@
 """The results of an evaluation: one row for each episode."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ def block_of(given: Scenario | Family) -> int:
     return BLOCK if isinstance(given, Family) else 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Results:
     """The metrics of a policy in a number of episodes of one scenario.
 
@@ -40,8 +40,12 @@ class Results:
     scenario: Scenario | Family
     seed: int
     split: str
-    columns: dict[str, Column] = field(repr=False)
+    columns: dict[str, Column]
     target: str | None = None
+
+    def __repr__(self) -> str:
+        played = f"{self.policy} on {self.scenario.name}{f' against {self.target}' if self.target else ''}"
+        return f"<Results of {played}: safe score {self.estimate('safe_score')}, {self.episodes} episodes>"
 
     @property
     def episodes(self) -> int:
