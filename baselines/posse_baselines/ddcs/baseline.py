@@ -35,7 +35,7 @@ from posse.numeric import FloatArray, Record, Records, compiled, kernel
 from posse_baselines.ddcs.actuation import correct, execute_safely, surround
 from posse_baselines.ddcs.memory import Minds, Team, is_due, pair, unit_of
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE, monitor, write_message
-from posse_baselines.ddcs.motion import move, next_task, want
+from posse_baselines.ddcs.motion import guide_of, move, next_task, want
 from posse_baselines.ddcs.roles import REPLAN_TIME, choose_slot, settle_lead
 from posse_baselines.ddcs.settings import NO_EXCHANGE, Settings
 from posse_baselines.fields import changed
@@ -150,8 +150,9 @@ def track(team: Team, me: Record, mates: Records, work: Work) -> None:
         me.slot = -1
     elif me.slot < 0 or is_due(team, me, REPLAN_TIME):
         choose_slot(team, me, mates, work)
-    me.task = next_task(team, me, mates)
-    move(team, me, mates)
+    guide = guide_of(team, me, mates)
+    me.task = next_task(team, me, guide)
+    move(team, me, mates, guide)
 
 
 ACT, PROPOSE, CARRY_OUT, GUARD = range(4)

@@ -81,7 +81,7 @@ def guide_of(team: Team, me: Record, mates: Records) -> Guide:
 
 
 @compiled
-def next_task(team: Team, me: Record, mates: Records) -> int:
+def next_task(team: Team, me: Record, guide: Guide) -> int:
     """Return the next task.
 
     Converging and flocking change with hysteresis: flocking begins within ``near`` of the place and ends beyond ``far``
@@ -93,7 +93,6 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
     elif me.exchanges > 0 and me.confirmed == 0 and task != SEARCHING:
         wanted = EXCHANGING
     else:
-        guide = guide_of(team, me, mates)
         near, far, error = settings.near, settings.far, length(guide.position + guide.arm - me.position)
         if settings.pngl and not guide.leads:
             near, far = settings.range_near, settings.range_far
@@ -113,7 +112,7 @@ def want(me: Record, velocity: complex, rate: float = 0.0) -> None:
 
 
 @compiled
-def move(team: Team, me: Record, mates: Records) -> None:
+def move(team: Team, me: Record, mates: Records, guide: Guide) -> None:
     """Set the motion of a tracker by its task."""
     settings = team.settings
     me.closing = 0
@@ -125,14 +124,12 @@ def move(team: Team, me: Record, mates: Records) -> None:
         # To where the target is predicted, to see it again.
         way = me.target - me.position
         want(me, scaled(unit(way), min(me.max_speed, settings.gain * length(way))))
+    elif guide.leads and me.task == FLOCKING:
+        follow(team, me, guide)
+    elif settings.pngl and not guide.leads:
+        pursue(team, me)
     else:
-        guide = guide_of(team, me, mates)
-        if guide.leads and me.task == FLOCKING:
-            follow(team, me, guide)
-        elif settings.pngl and not guide.leads:
-            pursue(team, me)
-        else:
-            take_place(team, me, guide)
+        take_place(team, me, guide)
 
 
 @compiled
