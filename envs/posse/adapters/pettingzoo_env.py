@@ -80,10 +80,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], _AgentInfos]:
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
-        if options is not None:
-            # PettingZoo's own tests send {"options": 1}, to see that options are taken.
-            options = {key: value for key, value in options_of(options).items() if key != "options"}
-        observations = self._start(seed, options)
+        # PettingZoo's own tests send {"options": 1}, to see that options are taken.
+        observations = self._start(seed, {key: v for key, v in options_of(options).items() if key != "options"})
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self.np_random = np.random.default_rng(seed)

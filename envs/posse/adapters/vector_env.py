@@ -87,8 +87,7 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             if "working" in infos:
                 infos["working"] = self.batch.working[:, self._rows]
         infos = _with_masks(infos, np.ones(self.num_envs, np.bool_)) | final
-        own = rewards.mean(axis=1, dtype=np.float64)
-        return observations[:, self._rows], own, terminated, truncated, infos
+        return observations[:, self._rows], rewards.mean(axis=1, dtype=np.float64), terminated, truncated, infos
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of the batch's infos, in the types of Gymnasium's own vector environments."""
