@@ -101,9 +101,9 @@ INVALID = {
     "train --advise ddcs-distributed": "needs algorithm cmaes, not ppo",
     "train --team idle": "team='idle' is of the side that learns, side='trackers'",
     "train --side target --team None": "set team",
-    "train --side target --encoding features": "encoding='features'",
+    "train --side target --encoding features": "side='target' needs encoding='plain', not 'features'",
     "train --side target --reward-weights slot=1.0": "'slot' has no formula for a target",
-    "train --imitate pursuit": "safeguard=True does not go with imitate='pursuit'",
+    "train --imitate pursuit": "imitate='pursuit' proposes no velocities to the safeguard",
     "train --preset residual --advise planner": "'planner'",
     "train --wandb project": "pip install wandb",
 }

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import HORIZON, quiet, small
+from tests.support.runs import quiet, small
 
 import posse
 from posse_baselines import BasePolicy, load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.checkpoint import read_checkpoint, restore_model
-from posse_training.train.export import export
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import Normaliser, RunningStatistics
 from posse_training.train.train import train
@@ -73,9 +72,16 @@ class _Circle(BasePolicy):
         actions = np.stack([np.full_like(side, 0.5), 0.8 * side, np.ones_like(side)], axis=-1)
         return actions.astype(np.float32), memory
 
+    def propose(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        return self.act(observations, memory)[0][..., :2], memory
 
-def test_imitation_copies(tmp_path: Path) -> None:
-    settings = small(tmp_path, imitate="circle", imitate_rounds=4, encoding="plain", target="smart")
+    def carry_out(self, observations: Any, memory: Any, corrections: Any) -> tuple[Any, Any]:
+        return np.zeros((*corrections.shape[:2], 3), np.float32), memory  # its own safeguard is not copied
+
+
+@pytest.mark.parametrize("guard", [False, True])
+def test_imitation_copies(tmp_path: Path, guard: bool) -> None:
+    settings = small(tmp_path, imitate="circle", imitate_rounds=4, encoding="plain", target="smart", safeguard=guard)
     env = make_env(settings)
     model = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []
@@ -83,12 +89,9 @@ def test_imitation_copies(tmp_path: Path) -> None:
     imitate(model, settings, env.encoding, _Circle(), statistics, lambda line: errors.append(float(line.split()[-1])))
     assert len(errors) == 4
     assert errors[-1] < 0.02
-    policy = export(model, settings, env.encoding, {})
-    batch = posse.batch("constant", 20, num_trackers=2, horizon=HORIZON, settle_time=1.0, seed=99)
-    observations = batch.reset()
-    mine, _ = policy.act(observations, policy.begin(batch.layout, 20))
-    side = batch.layout.views(observations)["target_bearing"][..., 1]
-    assert np.abs(mine[..., 1] - 0.8 * side).mean() < 0.15
+    mine, _ = model.predict(rows := env.reset(), deterministic=True)
+    side = env.batches[0].layout.views(rows)["target_bearing"][:, 1]
+    assert np.abs(mine[:, 1] - 0.8 * side).mean() < 0.15
     # The statistics are those of the expert's observations.
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     np.testing.assert_allclose(normaliser.mean, statistics.mean, rtol=1e-5, atol=1e-6)

@@ -85,7 +85,7 @@ def imitate(
             by_expert = generator.random(worlds) < 1.0 - k / max(1, rounds - 1)
             batch = batch_for(expert, scenario, worlds, target, seed=settings.seed, first_world=first_world)
             state = StateWriter(batch, [one for one, _ in plays]) if reads_state else None
-            slots = SlotGroup(batch, encoding, state)
+            slots = SlotGroup(batch, encoding, state, settings.safeguard)
             played.append(_play_round(policy, settings, slots, expert, batch, by_expert))
             first_world += worlds
         every += played
@@ -107,7 +107,7 @@ def _together(parts: list[Rows]) -> tuple[torch.Tensor, ...]:
 
 
 def _play_round(
-    policy: Any, settings: TrainSettings, slots: SlotGroup, expert: Policy, batch: Batch, by_expert: Any
+    policy: Any, settings: TrainSettings, slots: SlotGroup, expert: Any, batch: Batch, by_expert: Any
 ) -> Rows:
     """Play one episode in each world; the expert acts where ``by_expert`` (E,) says so, the copy in the rest."""
     parts, trackers = 2 + settings.message_size, batch.scenario.num_trackers
@@ -116,18 +116,26 @@ def _play_round(
     inputs, chosen, rewards, goes_on = [], [], [], []
     for _ in range(batch.scenario.horizon):
         x = slots.encode(observations)
-        wanted, memory = expert.act(observations, memory)
-        actions = wanted.copy()
+        if slots.guard is None:
+            wanted, memory = expert.act(observations, memory)
+            actions = wanted.copy()
+        else:  # what is copied is what it wants before its own safeguard
+            velocities, memory = expert.propose(observations, memory)
+            actions, memory = expert.carry_out(observations, memory, np.zeros_like(velocities))
+            wanted = np.concatenate([velocities, actions[..., 2:]], axis=2)
+        chosen.append(wanted[:, :, :parts].reshape(-1, parts))
         if not by_expert.all():
             with torch.no_grad():
                 own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
+            own = np.clip(own, -1, 1).reshape(-1, trackers, parts)
+            if slots.guard is not None:
+                own = slots.guard.actions(observations, own)
             # The expert's messages are sent as well: its labels are those of a team of its own.
             said = actions[..., 2 : 2 + expert.message_size].copy()
-            actions[~by_expert, :, :parts] = np.clip(own.reshape(-1, trackers, parts)[~by_expert], -1, 1)
+            actions[~by_expert, :, :parts] = own[~by_expert]
             actions[..., 2 : 2 + expert.message_size] = said
         observations, reward, terminated, truncated, _ = batch.step(actions)
         inputs.append(x)
-        chosen.append(wanted[:, :, :parts].reshape(-1, parts))
         rewards.append(reward.reshape(-1))
         touching = settings.end_on_contact & batch.arrays.tracker["touching"].any(axis=1)
         over = terminated | truncated

@@ -245,15 +245,7 @@ def _misfits(s: TrainSettings) -> Iterator[str]:
 def _conflicts(s: TrainSettings) -> Iterator[str]:
     """Yield why settings that are valid on their own exclude each other."""
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
-        yield (
-            f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}, where it "
-            "begins"
-        )
-    if s.safeguard and s.imitate is not None:
-        yield (
-            f"safeguard=True does not go with imitate={s.imitate!r}, whose actions are no wanted velocities: use "
-            "--no-safeguard"
-        )
+        yield f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}: lower it"
     own, other = ("target", "team") if s.side == "target" else ("team", "target")
     if getattr(s, own) is not None:
         yield (
@@ -265,10 +257,7 @@ def _conflicts(s: TrainSettings) -> Iterator[str]:
             yield "side='target' needs the teams that chase it: set team, for example to ddcs-tuned"
         for name, needed in _OF_A_TARGET.items():
             if (value := getattr(s, name)) != needed:
-                yield (
-                    f"{name}={value!r} does not go with side='target', which needs {needed!r}: a target has no team, "
-                    "no slots and no messages"
-                )
+                yield f"side='target' needs {name}={needed!r}, not {value!r}: a target has no team, slots or messages"
     for name, instead in _ELSEWHERE.items():
         if name in s.overrides and (name != "num_trackers" or s.team_sizes):
             yield f"overrides cannot set {name!r}: use {instead} instead"

@@ -99,11 +99,13 @@ def check_before(settings: TrainSettings) -> None:
         check_adviser(settings)
     divided(settings)
     goes_on = (settings.run_folder / checkpoint.CHECKPOINT).exists()
-    for policy in (settings.beside, None if goes_on else settings.imitate):
-        if policy is not None:
-            LOAD[settings.side](policy)
+    if settings.beside is not None:
+        LOAD[settings.side](settings.beside)
     if goes_on:
         return  # what follows is about the beginning of a run
+    if settings.imitate is not None and not hasattr(load(settings.imitate), "propose") and settings.safeguard:
+        teachers = "imitate belief-planner or a team of the DDCS, or use --no-safeguard"
+        raise SettingsError(f"imitate={settings.imitate!r} proposes no velocities to the safeguard: {teachers}")
     kind, first = ALGORITHMS.get(settings.algorithm), settings.learning_starts
     if kind is not None and not kind.on_policy and first >= settings.steps:
         raise SettingsError(f"learning_starts={first} must be below steps={settings.steps}: lower it")

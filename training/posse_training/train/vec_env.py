@@ -188,7 +188,7 @@ class SlotGroup:
         self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
         self._state = state
         # What makes the robots' actions of the model's, and the observations that it reads.
-        self._guard = Guard(batch.layout, worlds) if safeguard else None
+        self.guard = Guard(batch.layout, worlds) if safeguard else None
         self._seen = np.zeros(batch.observation_shape, np.float32)
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
@@ -207,8 +207,8 @@ class SlotGroup:
     def restart(self, mask: BoolArray) -> None:
         """Begin an episode in the worlds of a mask (E,)."""
         self._encoder.restart(mask)
-        if self._guard is not None:
-            self._guard.restart(mask)
+        if self.guard is not None:
+            self.guard.restart(mask)
         self._returns[mask] = 0
         self._cut_at[mask] = _NEVER
 
@@ -220,8 +220,8 @@ class SlotGroup:
         Returns observations, rewards, dones and infos, one row a slot, and the reward's terms.
         """
         batch = self.batch
-        if self._guard is not None:
-            actions = self._guard.actions(self._seen, actions)
+        if self.guard is not None:
+            actions = self.guard.actions(self._seen, actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
         over = terminated | truncated
@@ -275,8 +275,8 @@ class SlotGroup:
         """Return every array by name; views, not copies, without padding between fields."""
         own = {**self.batch.arrays.by_name(), **self._encoder.arrays()}
         own |= {"cut_at": self._cut_at, "returns": self._returns}
-        if self._guard is not None:
-            own |= {"seen": self._seen, **self._guard.arrays()}
+        if self.guard is not None:
+            own |= {"seen": self._seen, **self.guard.arrays()}
         if isinstance(self.batch, PairedBatch):  # the memory of the policy inside
             inside: Any = self.batch.inside
             own |= {f"opponent.{name}": array for name, array in inside.arrays(self.batch.memory).items()}
