@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -56,11 +56,11 @@ class Trajectory:
     """
 
     steps: int
-    arrays: dict[str, Array]
+    arrays: dict[str, Array] = field(repr=False)
     layout: ObservationLayout
     split: str
     lengths: npt.NDArray[np.int64]
-    metrics: dict[str, npt.NDArray[np.float64]]
+    metrics: dict[str, npt.NDArray[np.float64]] = field(repr=False)
 
     @property
     def scenario(self) -> Scenario:
@@ -77,6 +77,7 @@ class Trajectory:
 
     def episode(self, world: int) -> "Trajectory":
         """Return the first episode of one world: E = 1."""
+        world = range(len(self.lengths))[world]  # also from the end
         steps, one = int(self.lengths[world]), slice(world, world + 1)
         surplus = self.steps - steps  # rows after its end
         arrays = {name: array[: len(array) - surplus, one] for name, array in self.arrays.items()}
@@ -122,6 +123,8 @@ class Recorder:
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
+        if "reset_mask" in (options or {}):
+            raise ValueError("reset_mask leaves episodes running, of which the beginning is not recorded: leave it out")
         observations = self.batch.reset(seed=seed, options=options)
         self.over = np.zeros(self.batch.num_worlds, np.bool_)
         self.steps = 0
@@ -177,13 +180,13 @@ class Recorder:
     def _keep_frame(self, observations: FloatArray) -> None:
         state = self.batch.state if self._reads_state else {}  # it takes as long as a step of a hundred worlds
         self._keep({name: poses_of(state, who) for name, who in _POSES.items() if name in self._names})
-        self._keep({name: state[name].copy() for name in self._names if name in state} | {"observations": observations})
+        self._keep({name: state[name] for name in self._names if name in state} | {"observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
         """Keep the rows that were asked for by name, or by the part of the name before the slash."""
         for name, row in rows.items():
             if name.partition("/")[0] in self._names:
-                self._rows[name].append(row)
+                self._rows[name].append(row.copy())
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded since the reset; ResetNeeded before the first one."""

@@ -74,6 +74,8 @@ class BasePolicy:
         """Return the memory with the worlds of a mask (E,) restarted."""
         if hasattr(memory, "restart"):
             memory.restart(mask)
+        elif not isinstance(memory, (ObservationLayout, type(None))):
+            raise PolicyError(f"policy {self.name!r} must forget a world that restarts: define restart(memory, mask)")
         return memory
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -106,7 +108,7 @@ def check_observations(observations: npt.ArrayLike, robots: tuple[int, ...], lay
 
 def check_policy(policy: object) -> None:
     """Raise TypeError for what is no policy, PolicyError for one of a target."""
-    if not isinstance(policy, Policy):
+    if isinstance(policy, type) or not isinstance(policy, Policy):
         raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; load() takes names")
     if getattr(policy, "side", "trackers") == "target":
         raise PolicyError(f"policy {policy.name!r} moves a target: give it as target=, or --target")

@@ -31,7 +31,7 @@ class _WithTeammates:
             raise ScenarioError(f"num_trackers={found.num_trackers} leaves no team-mates: use posse/Solo-v0")
         number: object = self.number
         last = found.num_trackers - 1
-        if not isinstance(number, (int, np.integer)) or not 0 <= number <= last:
+        if not isinstance(number, (int, np.integer)) or isinstance(number, bool) or not 0 <= number <= last:
             raise ScenarioError(f"number={number!r} is not in the team: trackers are 0 to {last}")
         return found.replace(message_size=max(found.message_size, self.teammates.message_size))
 

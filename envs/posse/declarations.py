@@ -113,6 +113,9 @@ class Declaration:
             reason = 'the decorator needs arguments: a unit, such as "1", or a name'
             raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
 
+    def __repr__(self) -> str:
+        return f"<{self.kind} {self.name!r} [{self.unit}]: {self.meaning}>" if "name" in vars(self) else self.kind
+
     def __call__(self, function: Function) -> Function:
         """Declare a function, and return it, compiled if kernels call it.
 
@@ -205,7 +208,7 @@ class Field:
     """Whether it is repeated for each place of a team-mate."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class field(Declaration):  # noqa: N801 (used as a function is)
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
@@ -288,7 +291,7 @@ class field(Declaration):  # noqa: N801 (used as a function is)
         return float(value)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class reward_term(Declaration):  # noqa: N801
     """Declare a function as a reward term with its name; its docstring is the meaning.
 
@@ -316,7 +319,7 @@ class reward_term(Declaration):  # noqa: N801
         return self.function if self.target is None and "t" not in parameters_of(self.function) else self.target
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class metric(Declaration):  # noqa: N801
     """Declare a function as a metric of an episode with its name; its docstring is the meaning.
 
@@ -374,7 +377,7 @@ class metric(Declaration):  # noqa: N801
         return mean
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class target_motion(Declaration):  # noqa: N801
     """Declare a function as a target motion; its docstring is the meaning.
 
@@ -420,7 +423,7 @@ class target_motion(Declaration):  # noqa: N801
                 raise self.error(f"invalid name {each!r} of a memory: use a name that Python allows")
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class sensor(Declaration):  # noqa: N801
     """Declare a function as the sight of a kind of sensor; its docstring is the meaning.
 

@@ -13,6 +13,7 @@ from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import PlannerSettings
+from posse_baselines.policy import from_function
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if name != "planner"]
@@ -147,10 +148,18 @@ def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
         for name in names:
             np.testing.assert_array_equal(one[name], alone[name])
         assert one.metrics["score"] == alone.metrics["score"]
+    assert found.episode(-1).metrics["score"] == found.metrics["score"][-1]
+
+
+def test_what_is_recorded_stays_as_it_was() -> None:
+    erasing = from_function(lambda observations: np.multiply(observations, 0, out=observations)[..., :2])
+    played = rollout(posse.batch("constant", 1), erasing, ["observations", "annotations"], steps=3)
+    assert played["observations"].any(axis=-1).all()
+    assert "array" not in repr(played).replace("lengths=array", "")
 
 
 def test_what_cannot_be_recorded_or_played_is_named() -> None:
-    for wrong in ("idle", None):
+    for wrong in ("idle", None, type(load("idle"))):
         with pytest.raises(TypeError, match="is no policy"):
             rollout(posse.batch("constant", 1), wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="record='speed' is unknown; names are: observations, "):
@@ -159,11 +168,15 @@ def test_what_cannot_be_recorded_or_played_is_named() -> None:
         rollout(posse.batch("constant", 1, autoreset="same_step"), load("idle"), ["tracker_x"])
     with pytest.raises(ValueError, match="steps=0 must be"):
         rollout(posse.batch("constant", 1), load("idle"), steps=0)
+    with pytest.raises(ValueError, match="reset_mask leaves episodes running"):
+        rollout(posse.batch("constant", 1), load("idle"), options={"reset_mask": np.array([True])})
 
 
-def test_a_memory_that_cannot_be_saved_is_refused() -> None:
+def test_a_memory_that_cannot_be_saved_or_restarted_is_refused() -> None:
     with pytest.raises(PolicyError, match=r"'idle' cannot be saved: define its method arrays\(memory\)"):
         BasePolicy.arrays(load("idle"), np.zeros(3))  # type: ignore[arg-type]
+    with pytest.raises(PolicyError, match=r"'idle' must forget.*define restart\(memory, mask\)"):
+        load("idle").restart(np.zeros(3), np.ones(3, np.bool_))
 
 
 # --- refusals ------------------------------------------------------------------------------------

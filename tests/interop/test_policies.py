@@ -54,8 +54,13 @@ def test_no_robot_alone_plays_the_model_of_a_team() -> None:
         deploy(from_sb3(model), posse.Robot("constant", 0))
     ends = np.float32(0.0), np.float32(1.0)
     scaled = PPO("MlpPolicy", gymnasium.wrappers.RescaleAction(gymnasium.make("posse/Team-v0"), *ends), device="cpu")
+    thirds = DQN("MlpPolicy", gymnasium.wrappers.DiscretizeAction(gymnasium.make("posse/Solo-v0"), 3), buffer_size=10)
     wrong: Any
-    for wrong, message in ((scaled, r"learned on those in \[-1, 1\]"), ("solo.zip", r"PPO\.load\(path\)")):
+    for wrong, message in (
+        (scaled, "on those of posse"),
+        (thirds, "on those of posse"),
+        ("solo.zip", r"PPO\.load\(path\)"),
+    ):
         with pytest.raises(PolicyError, match=message):
             from_sb3(wrong)
 

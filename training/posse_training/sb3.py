@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env import VecNormalize  # noqa: E402
 from posse import ObservationLayout  # noqa: E402
 from posse.adapters.actions import MOTIONS  # noqa: E402
 from posse.numeric import BoolArray, FloatArray  # noqa: E402
+from posse.scenarios.setting import check_count  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.learned import Encoder, Encoding  # noqa: E402
 from posse_baselines.policy import BasePolicy, check_observations  # noqa: E402
@@ -64,20 +65,22 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
     ) -> None:
         if not isinstance(model, BaseAlgorithm):
             raise PolicyError(f"{model!r:.80} is no model: load the file by its class, PPO.load(path)")
-        self.model, self.message_size = model, message_size
+        self.model, self.message_size = model, check_count("message_size", message_size, 0)
         self.name = name or type(model).__name__
         self._encoding, self._safeguard = encoding, safeguard
         self._normalize = normalize or model.get_vec_normalize_env()
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
-            raise PolicyError(
-                f"a model with observations {model.observation_space} plays no team: it must have learned on (F,) or "
-                "(N, F)"
-            )
-        actions = model.action_space
-        if isinstance(actions, spaces.Box) and not (np.all(actions.low == -1) and np.all(actions.high == 1)):
-            raise PolicyError(f"a model with actions {actions} plays no team: it must have learned on those in [-1, 1]")
-        self._discrete = isinstance(model.action_space, (spaces.Discrete, spaces.MultiDiscrete))
+            raise PolicyError(f"observations {model.observation_space} of a model are no team's: wanted (F,) or (N, F)")
+        actions, rows = model.action_space, shape[:-1]
+        self._discrete = isinstance(actions, (spaces.Discrete, spaces.MultiDiscrete))
+        choices = np.asarray(getattr(actions, "nvec", getattr(actions, "n", 0)))
+        fits = choices.shape == rows and (choices == len(MOTIONS)).all()
+        if isinstance(actions, spaces.Box):
+            bounds = np.all((actions.low == -1) & (actions.high == 1))
+            fits = actions.shape[:-1] == rows and actions.shape[-1] >= 2 and bounds
+        if not fits:
+            raise PolicyError(f"a model with actions {actions} plays no team: it must have learned on those of posse")
         self.whole_team = len(shape) == 2
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:

@@ -154,7 +154,7 @@ class PosseEnv(EnvBase):
             self._seed = None
         if self._guard is not None:
             self._guard.restart(mask)
-        self._seen = observations[:, self._rows[TRACKERS]]
+        self._seen = observations[:, self._rows[TRACKERS]].copy()
         return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -173,7 +173,7 @@ class PosseEnv(EnvBase):
             motions = self._guard.actions(self._seen, actions[:, self._rows[TRACKERS]])
             actions = np.concatenate([motions, actions[:, motions.shape[1] :]], axis=1)
         observations, rewards, *_ = self.batch.step(actions)
-        self._seen = observations[:, self._rows[TRACKERS]]
+        self._seen = observations[:, self._rows[TRACKERS]].copy()  # as _pack shares its memory
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)
         for group, part in self._rows.items():

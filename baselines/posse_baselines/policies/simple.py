@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray
+from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import BasePolicy, Memory, check_observations
 
 _SHIFT: Final = np.uint64(40)
@@ -39,6 +39,10 @@ class Random(BasePolicy):
         s = super().begin(layout, num_worlds).scenario
         shape = s.num_trackers, 2 + s.message_size, layout.size
         return np.random.default_rng(0).integers(2**64, size=shape, dtype=np.uint64)
+
+    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
+        """Return the memory as it is."""
+        return memory
 
     def arrays(self, memory: Memory) -> dict[str, Any]:
         """Return none: the factors are always those of :meth:`begin`."""

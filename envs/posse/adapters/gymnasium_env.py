@@ -43,7 +43,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     State, start and end are those of :class:`posse.adapters.pettingzoo_env.TeamParallelEnv`.
 
     **Observation**: ``Box`` (N, F) float32, the observation of each tracker; its fields are
-    ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
+    ``posse.observation_fields(scenario)``, and ``env.unwrapped.layout.views(observation)`` names them.
 
     **Action**: ``Box(-1, 1, (N, 2 + message_size))`` float32, the action of each tracker there. With
     ``discrete_actions=True`` ``MultiDiscrete([15] * N)``.

@@ -59,14 +59,17 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
         super().__init__(scenario, **settings)
         self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
-        self.agents: list[str] = []
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
         self.action_spaces = {
             a: single_action_space(self.scenario.message_size, self._discrete) for a in self.possible_agents
         }
         self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
-        self._none_ended = dict.fromkeys(self.possible_agents, False)
         self.np_random = np.random.default_rng(settings.get("seed"))  # that of SuperSuit's frame_skip_v0; no world's
+
+    @property
+    def agents(self) -> list[str]:
+        """The agents of the running episode; none before the first reset and after the end."""
+        return self.possible_agents.copy() if self.batch._started and not self.batch._over else []
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -82,10 +85,9 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         # PettingZoo's own tests send {"options": 1}, to see that options are taken.
         observations = self._start(seed, {key: v for key, v in options_of(options).items() if key != "options"})
-        self.agents = self.possible_agents.copy()
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
+        return dict(zip(self.possible_agents, observations, strict=True)), self._infos_of(self.possible_agents)
 
     def step(
         self, actions: Mapping[str, Any]
@@ -96,13 +98,12 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
-        agents, batch, own = self.agents, self.batch, self._own
+        agents, batch, own = self.possible_agents, self.batch, self._own
         batch.check_running()
         self._advance(self.actions_of(actions))
-        terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
+        terminations, truncations = dict.fromkeys(agents, False), dict.fromkeys(agents, False)
         if batch._over:
             (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
-            self.agents = []
         return (
             dict(zip(agents, own.observations.copy())),  # noqa: B905  equal lengths, in the hot path
             dict(zip(agents, own.rewards.tolist())),  # noqa: B905
@@ -138,7 +139,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def _read(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return actions by agent as an array, whose range is not checked; ValueError names a wrong one."""
-        agents = self.agents
+        agents = self.possible_agents
         try:
             if self._discrete or type(actions) is not dict or len(actions) != len(agents):
                 raise TypeError
@@ -161,8 +162,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         return self._actions
 
     def _place(self, _: int, row: int, k: int) -> str:
-        parts = ("speed", "turn rate")
-        return f"action of {self.agents[row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
+        return f"action of {self.possible_agents[row]}: {('speed', 'turn rate')[k] if k < 2 else f'message[{k - 2}]'}"
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:

@@ -5,7 +5,7 @@ The environments, training and evaluation are built on :class:`Batch`.
 
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -49,7 +49,7 @@ class Snapshot(OwnArrays):
     """A saved state of a batch: :meth:`Batch.save`, :meth:`Batch.restore`."""
 
     scenario: Scenario
-    arrays: WorldArrays
+    arrays: WorldArrays = field(repr=False)
 
 
 class Batch(OwnArrays):

@@ -1,5 +1,6 @@
 """A batch in which a policy moves some robots: the target, the trackers, or all trackers but one."""
 
+import copy
 import reprlib
 from typing import Any, Protocol, runtime_checkable
 
@@ -86,6 +87,9 @@ class PairedBatch(Batch):
         if hasattr(inside, "watch"):
             inside.watch(self)
         self.memory: Any = inside.begin(self.layout, worlds)
+
+    def __copy__(self) -> "PairedBatch":
+        return copy.deepcopy(self)  # its memory, too
 
     @property
     def working(self) -> BoolArray:

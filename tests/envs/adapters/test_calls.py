@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_sta
 from tests.support.adapters import f32, out_of_band, same
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
 
-from posse import REWARD_TERMS
+from posse import REWARD_TERMS, parallel_env
 
 SEEDS = st.integers(0, 2**63 - 1)
 
@@ -107,6 +107,16 @@ def test_a_copy_made_in_mid_episode_goes_on_alike(kind: str, replica: Any) -> No
     twin.env = replica(one.env)
     assert same(played(one, 20), played(twin, 20))
     assert same(one.env.reset(seed=1), twin.env.reset(seed=1))
+
+
+def test_an_environment_goes_on_from_where_it_was_saved() -> None:
+    env = parallel_env("constant", horizon=3)
+    env.reset()
+    saved, actions = env.batch.save(), {agent: env.action_space(agent).sample() for agent in env.agents}
+    while env.agents:
+        env.step(actions)
+    env.batch.restore(saved)
+    assert list(env.step(actions)[0]) == env.agents == env.possible_agents
 
 
 @one_by_one

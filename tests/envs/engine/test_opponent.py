@@ -1,5 +1,6 @@
 """A batch in which a policy moves the target."""
 
+import copy
 from typing import Any
 
 import gymnasium as gym
@@ -157,3 +158,8 @@ def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
         contacts += terms["contact"]
     assert contacts == 1 == batch.metrics()["target_contacts"][0]
     assert scenario.to_dict()["target_reward_weights"] == weights
+
+
+def test_a_copy_has_a_memory_of_its_own() -> None:
+    one = posse.batch(SHORT, WORLDS, target_policy=Weaver())
+    assert copy.copy(one).memory is not one.memory

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
 
 import posse
 from posse_baselines import PolicyError, load
@@ -54,6 +56,13 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
             total[:] = 0
         else:
             assert all(told == {} for told in infos)
+
+
+def test_shortened_episodes_are_in_no_statistics_of_sb3() -> None:
+    env = make(worlds=4, staggered=True)
+    model = PPO("MlpPolicy", env, device="cpu")
+    _, lengths = evaluate_policy(model, env, n_eval_episodes=20, return_episode_rewards=True)
+    assert set(lengths) == {HORIZON}
 
 
 def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
@@ -143,7 +152,7 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
     ("batches", "message"),
     [
         ([], r"one length, these have \[\]"),
-        ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
+        ([{"autoreset": "same_step"}], "make batches with 'disabled'"),
         ([{"target_motion": "agent"}], "the target"),
         ([{}, {"message_size": 1}], r"one length, these have \[2, 3\]"),
     ],

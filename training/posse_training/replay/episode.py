@@ -46,7 +46,7 @@ class Player:
     """
 
     name: str
-    columns: dict[str, npt.NDArray[Any]]
+    columns: dict[str, npt.NDArray[Any]] = field(repr=False)
     events: tuple[Event, ...] = ()
     metrics: dict[str, float] = field(default_factory=dict)
     about: dict[str, Any] = field(default_factory=dict)

@@ -68,7 +68,7 @@ def record(
     place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
     moved_by = target.name if isinstance(target, Target) else str(target)
     replays = []
-    for given in policies:
+    for given in (policies,) if isinstance(policies, str) else policies:
         label, policy = given if isinstance(given, tuple) else ("", given)
         loaded = load(policy)
         batch = batch_for(loaded, settings, 1, opponent, **place, autoreset="disabled")

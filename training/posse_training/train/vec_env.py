@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
@@ -151,8 +152,8 @@ class TeamVecEnv(VecEnv):
         return [results[batch] for batch in owners]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
-        """Return ``False`` for each slot."""
-        return [False] * len(self._batches_of(indices))
+        """Return ``True`` for SB3's ``Monitor``: an info tells of a whole episode when it ends."""
+        return [wrapper_class is Monitor] * len(self._batches_of(indices))
 
     def _batches_of(self, indices: VecEnvIndices) -> list[Batch]:
         return [self._owners[slot] for slot in self._get_indices(indices)]
@@ -162,10 +163,7 @@ def _action_length(batches: Sequence[Batch]) -> int:
     """Return the length of the batches' actions; raise if they do not go together."""
     for batch in batches:
         if batch.autoreset != "disabled":
-            raise ValueError(
-                f"a batch with autoreset={batch.autoreset!r} hides the last observation of an "
-                'episode: make it with autoreset="disabled"'
-            )
+            raise ValueError(f"autoreset={batch.autoreset!r} hides last observations: make batches with 'disabled'")
         both = batch.observation_shape[1] == batch.scenario.num_agents
         if both and batch.scenario.target_motion == "agent":
             raise ValueError(f"the target of {batch.scenario.name!r} is an agent; one policy drives one side")
