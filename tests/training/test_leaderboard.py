@@ -9,7 +9,7 @@ import pytest
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate, leaderboard
 from posse_training.errors import PlayError, SettingsError
-from posse_training.leaderboard import CLAIM, Standing, measure, standings_text, submit, verify
+from posse_training.leaderboard import CLAIM, Standing, measure, read_standings, standings_text, submit, verify
 
 SCENARIO = "paper-distributed"
 WORLDS = 60
@@ -50,20 +50,21 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
     ("changes", "message"),
     [
         *(({"label": label}, "label=|must have one row|line 2") for label in HOSTILE),
+        *(({"label": label}, "is empty or that of a policy") for label in (" ", "planner")),
         ({"policy": "../p.safetensors"}, "policy="),
         ({"scenario": "nowhere"}, "no scenario 'nowhere'"),
         ({"version": 99}, "of version 99"),
         ({"seed": 7}, "claims are of seed 2026"),
         *((wrong, "no play has such") for wrong in ({"worlds": -5}, {"low": 0.99}, {"contact_free": 2.5})),
         ({"safe_score": "high"}, "could not convert"),
-        ({"policy": "forged_module:Policy"}, "--run-code"),
+        ({"label": "mine", "policy": "forged_module:Policy"}, "--run-code"),
     ],
 )
 def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         verify(sent(tmp_path, claim, **changes))
     with pytest.raises(PlayError, match="LocalError"):
-        verify(sent(tmp_path, claim, policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
+        verify(sent(tmp_path, claim, label="mine", policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
 
 
 def test_a_policy_file_travels_with_its_claim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +73,9 @@ def test_a_policy_file_travels_with_its_claim(tmp_path: Path, monkeypatch: pytes
     out = tmp_path / "sent"
     replaced = lambda *claim: (given.write_bytes(b"by a training"), measure(*claim))[1]  # noqa: E731
     monkeypatch.setattr(leaderboard, "measure", replaced)
-    assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--episodes", "3", "--out", str(out)]) == 0
+    words = ["submit", str(given), "--scenario", SCENARIO, "--episodes", "3", "--out", str(out)]
+    assert cli.main(words) == 2, "its name is that of a shipped one"
+    assert cli.main([*words, "--name", "mine"]) == 0
     assert (out / given.name).read_bytes() == content, "the one that played"
     given.unlink()
     assert sorted(file.name for file in out.iterdir()) == ["mine.safetensors", CLAIM]
@@ -87,6 +90,12 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert cli.main(["submit", "pursuit", "--scenario", "family-open", "--out", str(tmp_path / "sent")]) == 2
     assert cli.main(["submit", "tests.support.bad_policies:Raises", "--out", str(tmp_path / "failed")]) == 2
     assert {path.name for path in tmp_path.rglob("*")} == {"kept.txt", "failed"}, "nothing in it, and no lock"
+
+
+def test_rows_of_one_label_and_scenario_are_refused(claim: Standing, tmp_path: Path) -> None:
+    (tmp_path / CLAIM).write_text(standings_text([claim, claim]), encoding="utf-8")
+    with pytest.raises(SettingsError, match="two rows have one label and scenario"):
+        read_standings(tmp_path / CLAIM)
 
 
 def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:

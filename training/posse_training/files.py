@@ -32,9 +32,7 @@ def locked(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             holder = (folder / _LOCK).read_text(encoding="utf-8").strip() or "unknown"
-            raise RunFolderError(
-                f"{folder} is in use by process {holder}: wait for it, stop it, or choose another --out"
-            ) from error
+            raise RunFolderError(f"process {holder} uses {folder}: wait, stop it, or choose another --out") from error
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
         file.flush()

@@ -60,6 +60,7 @@ class Standing:
 
     def __post_init__(self) -> None:
         check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
+        check_label(self.label, self.policy)
         ordered = 0 <= self.low <= self.safe_score <= self.high <= 1
         if not (ordered and 0 <= self.score <= 1 and 0 <= self.contact_free <= 1 and self.worlds >= 1):
             others = f"score {self.score}, contact_free {self.contact_free}"
@@ -79,6 +80,12 @@ def check_texts(**texts: str) -> None:
     for name, text in texts.items():
         if not _TEXT.fullmatch(text):
             raise SettingsError(f"{name}={text!r:.80} must be at most 100 letters, digits and '._:+ -'")
+
+
+def check_label(label: str, policy: str) -> None:
+    """Raise a ``SettingsError`` for an empty label, or one by which the package knows another policy."""
+    if not label.strip() or (label != policy and label in policy_names()):
+        raise SettingsError(f"name={label!r} is empty or that of a policy of the package: choose another one")
 
 
 def measure(label: str, text: str, policy: Policy, scenario: str, worlds: int, seed: int) -> Standing:
@@ -124,6 +131,8 @@ def read_standings(path: str | Path) -> list[Standing]:
             rows.append(Standing(**values))
     except (ValueError, KeyError, TypeError, csv.Error) as error:
         raise SettingsError(f"{path}, line {len(rows) + 2}: {error}") from error
+    if len({(row.label, row.scenario) for row in rows}) < len(rows):
+        raise SettingsError(f"{path}: two rows have one label and scenario: rename one")
     return rows
 
 
@@ -154,6 +163,7 @@ def submit(
     text = Path(policy).name if is_file else policy
     label = name or (loaded.name if is_file else policy)
     check_texts(name=label, policy=text)
+    check_label(label, text)
     prepare(loaded, get_scenario(scenario), episodes, SEED)  # a family has no standings
     with held_new(out):
         with played_errors():

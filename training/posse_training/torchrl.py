@@ -82,10 +82,7 @@ class PosseEnv(EnvBase):
         **settings: Any,
     ) -> None:
         if "autoreset" in settings:
-            raise TypeError(
-                f"autoreset={settings['autoreset']!r} cannot be set: TorchRL itself resets worlds "
-                "that are done; leave it out"
-            )
+            raise TypeError(f"autoreset={settings['autoreset']!r} cannot be set: TorchRL itself resets; leave it out")
         if "team_policy" in settings:
             raise TypeError("team_policy= is not possible: a PosseEnv has trackers; make its target an agent")
         self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)

@@ -171,9 +171,7 @@ class _Run:
         own = getattr(policy, "settings", None)
         self.tunables = tunables(own) if is_tunable and is_dataclass(own) else ()
         if not self.tunables:
-            raise PolicyError(
-                f"policy {settings.policy!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}"
-            )
+            raise PolicyError(f"policy {settings.policy!r:.100} has no tunable settings; {', '.join(FAMILY)} have")
         known = [t.name for t in self.tunables]
         for name in settings.only:
             if name not in known:

@@ -12,7 +12,7 @@ from posse_baselines import from_function
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
 from posse_training.errors import SettingsError
-from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds
+from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds, share
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 
@@ -62,6 +62,8 @@ def test_the_interval_of_a_share_of_all_has_a_width(tmp_path: Path) -> None:
     (results := evaluate("idle", "constant", 10, start_distance=(9.0, 10.0), **FAST)).write(str(tmp_path / "all.csv"))
     assert results.estimate("contact_free").low == pytest.approx(10 / (10 + 1.96**2), abs=1e-3)  # Wilson's, of 10 in 10
     assert "idle on constant: safe score 0.000 [0.000, 0.000], 10 episodes" in repr(results)
+    for several in (share(np.ones((3, 40))), share(np.ones((1, 400)), block=10)):
+        assert (several.low, several.high) == pytest.approx((40 / (40 + 1.96**2), 1), abs=1e-3)
     with pytest.raises(SettingsError, match=r"must end in \.csv"):
         results.write(tmp_path / "all.json")
 
@@ -105,6 +107,9 @@ class TestTrainingSeeds:
     def test_improvement_compares_every_pair_of_seeds(self) -> None:
         mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])
         assert improvement(mine, theirs).value == pytest.approx((1 + 0 + 1 + 0.5 + 4 * 0.25) / 8)
+        trained, script = np.random.default_rng(3).normal(size=(3, 1)) + np.zeros(50), np.zeros(50)
+        better, worse = improvement(trained, script), improvement(script, trained)
+        assert (worse.low, worse.high) == pytest.approx((1 - better.high, 1 - better.low))
 
     def test_worlds_that_do_not_match_are_refused(self) -> None:
         with pytest.raises(ValueError, match="same worlds"):

@@ -90,6 +90,6 @@ def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Pa
 
 
 def test_a_folder_in_use(tmp_path: Path) -> None:
-    with locked(tmp_path), pytest.raises(RunFolderError, match=f"in use by process {os.getpid()}"):
+    with locked(tmp_path), pytest.raises(RunFolderError, match=f"process {os.getpid()} uses"):
         train(small(tmp_path), console=quiet())
     assert not (tmp_path / "settings.json").exists()

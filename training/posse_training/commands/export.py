@@ -107,9 +107,7 @@ def main(arguments: Sequence[str]) -> None:
     known = shipped() | shipped(SHIPPED_TARGETS)
     path = known.get(which.policy, Path(which.policy))
     if path.suffix != ".safetensors":
-        raise SettingsError(
-            f"{which.policy!r} has no network: give {', '.join(known)}, or a policy file (.safetensors)"
-        )
+        raise SettingsError(f"{which.policy!r} has no network: give {', '.join(known)}, or a file, .safetensors")
     policy = LearnedPolicy.from_file(path)
     export(policy, which.out)
     *inputs, output = [f"{name} ({len(names)})" for name, names in columns(policy).items()]

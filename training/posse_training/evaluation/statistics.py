@@ -55,15 +55,18 @@ def middle_mean(samples: Values, axis: int) -> Any:
 
 
 def share(happened: npt.ArrayLike, block: int = 1) -> Estimate:
-    """Return the share of episodes (S, W) in which something happened: Wilson's interval for one seed and scenario."""
-    events = np.asarray(happened, bool)
+    """Return the share of episodes (S, W) in which something happened, with Wilson's interval for so many blocks.
+
+    Of several seeds, or of a family, the ends of :func:`over_seeds` count where they are wider.
+    """
+    events = np.atleast_2d(np.asarray(happened, bool))
+    p, n, z2 = events.mean(), -(-events.shape[1] // block), scipy.stats.norm.ppf((1 + LEVEL) / 2) ** 2
+    half = np.sqrt(z2 * (p * (1 - p) / n + z2 / (2 * n) ** 2))
+    low, high = ((p + z2 / (2 * n) + side) / (1 + z2 / n) for side in (-half, half))
     if len(events) > 1 or block > 1:
-        return over_seeds(events, block=block)
-    events = events.reshape(-1)
-    interval = scipy.stats.binomtest(int(events.sum()), len(events)).proportion_ci(
-        confidence_level=LEVEL, method="wilson"
-    )
-    return Estimate(float(events.mean()), float(interval.low), float(interval.high), len(events))
+        wide = over_seeds(events, block=block)
+        low, high = max(0.0, min(low, wide.low)), min(1.0, max(high, wide.high))
+    return Estimate(float(p), float(low), float(high), events.size)
 
 
 # --- several training seeds ----------------------------------------------------------------------
@@ -102,12 +105,13 @@ def difference(first: npt.ArrayLike, second: npt.ArrayLike, block: int = 1) -> E
 def improvement(first: npt.ArrayLike, second: npt.ArrayLike, block: int = 1) -> Estimate:
     """Return the probability that the first has the higher value in a world, ties counted half.
 
-    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. All pairs of
-    seeds are compared; the seeds of the first and the blocks of worlds are resampled.
+    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. All pairs of seeds are compared.
+    Blocks of worlds are resampled, and the seeds of that side whose interval is wider.
     """
     mine, theirs = _paired(first, second)
-    higher = ((mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)).mean(axis=1)
-    return over_seeds(higher, block=block)
+    higher = (mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)
+    either = (over_seeds(higher.mean(axis=side), block=block) for side in (1, 0))
+    return max(either, key=lambda found: found.high - found.low)
 
 
 def _paired(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[Values, Values]:

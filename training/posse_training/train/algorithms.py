@@ -168,9 +168,7 @@ def check_algorithm(settings: TrainSettings) -> None:
                     "messages: leave it out, or set algorithm to ppo"
                 )
     elif settings.advise is not None:
-        raise SettingsError(
-            f"advise={settings.advise!r} needs algorithm {EVOLUTION}, not {name}: leave one of them out"
-        )
+        raise SettingsError(f"advise={settings.advise!r} needs algorithm {EVOLUTION}, not {name}: leave one out")
     elif settings.imitate is not None and not kind.on_policy:
         raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
 
