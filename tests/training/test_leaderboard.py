@@ -64,7 +64,7 @@ def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dic
     with pytest.raises(SettingsError, match=message):
         verify(sent(tmp_path, claim, **changes))
     with pytest.raises(PlayError, match="LocalError"):
-        verify(sent(tmp_path, claim, label="mine", policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
+        verify(sent(tmp_path, claim, label="me", policy="tests.support.bad_policies:Raises"), run_code=True, episodes=2)
 
 
 def test_a_policy_file_travels_with_its_claim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
