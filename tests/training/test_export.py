@@ -11,8 +11,6 @@ from tests.support.learned import network_for, observations_of
 from tests.support.process import run_tests_elsewhere
 
 from posse.numeric import FloatArray
-from posse_baselines import load
-from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.learned.network import forward
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
@@ -72,18 +70,3 @@ def test_the_network_is_the_policy_but_for_the_safeguard(
     if safeguard:
         actions = Guard(batch.layout, 6).actions(observations, actions)
     np.testing.assert_allclose(actions, wanted, rtol=0, atol=1e-5)
-
-
-@needs_onnx
-def test_twice_a_correction_is_added_to_what_the_script_proposes(tmp_path: Path) -> None:
-    script = DDCS()
-    batch, observations = observations_of("smart", message_size=script.message_size)
-    encoding = Encoding.of(batch.layout, "features")
-    proposals, memory = script.propose(observations, script.begin(batch.layout, 6))
-    policy = LearnedPolicy(network_for(encoding.size + 2), encoding, {}, load("ddcs-distributed"))
-    wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
-    encoded = Encoder(encoding, batch.layout, 6).encode(observations)
-    rows = np.concatenate([encoded, proposals.reshape(len(encoded), -1)], axis=1)
-    change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
-    action, _ = script.carry_out(observations, memory, change)
-    np.testing.assert_allclose(action, wanted, rtol=0, atol=1e-5)
