@@ -71,7 +71,7 @@ def test_without_a_file_the_untuned_policy_is_played_and_the_split_of_tuning_is_
     assert scenario not in tuned_files(name)
     played, untuned = (play(batch_of(scenario), load(each))["score"] for each in (name, TUNED[name]))
     np.testing.assert_array_equal(played, untuned)
-    with pytest.raises(ValueError, match="was trained on the split 'train'"):
+    with pytest.raises(ValueError, match=f"'{name}' was trained on the split 'train'"):
         evaluate(name, "constant", 1, split="train", progress=False)
 
 

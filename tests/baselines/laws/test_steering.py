@@ -38,12 +38,9 @@ def test_a_slot_moves_on_a_circle_of_its_own() -> None:
     st.floats(0.2, 3.0),
 )
 def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: complex, gain: float) -> None:
-    def velocity(max_speed: float) -> complex:
-        return approach_velocity(offset, slot, gain, max_speed)
-
     free = slot + gain * offset
-    assert velocity(100.0) == pytest.approx(free, abs=1e-9)
-    limited = velocity(1.0)
+    assert approach_velocity(offset, slot, gain, 100.0) == pytest.approx(free, abs=1e-9)
+    limited = approach_velocity(offset, slot, gain, 1.0)
     if abs(free) <= 1.0:
         assert limited == pytest.approx(free, abs=1e-9)
     else:

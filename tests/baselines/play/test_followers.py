@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from tests.support.drive import Instant, complex_of, drive
 
@@ -44,12 +43,6 @@ def team(
     return list(drive(policy, "constant", 1, round(seconds / dt), target=target, **settings))
 
 
-def arms(seen: list[Instant], robot: int, mate: int) -> npt.NDArray[np.complex128]:
-    """A robot's control point as seen from a mate, m."""
-    away = np.array([now.line_of_sight[0, mate] - now.line_of_sight[0, robot] for now in seen])
-    return np.asarray(away + OFFSET * np.exp(1j * np.array([now.tracker[0, robot, 2] for now in seen])), np.complex128)
-
-
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004)])
 @pytest.mark.parametrize("frame", ["leader", "slot-frame"])
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
@@ -57,7 +50,9 @@ def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float)
     for error in (0.3 + 0.2j, -0.3 + 0.2j, -0.3j, -0.4 + 0j, 0.2 + 0.3j):
         seen = team(DDCS(FAMILY["pngl-l-phi"]).with_settings(follower_frame=frame), error, dt=dt)
         assert all((now.notes["task"] == FLOCKING).all() for now in seen)
-        arm = arms(seen, 1, 0)
+        # The follower's control point as seen from the leader.
+        points = [complex_of(now.tracker)[0] + (0, OFFSET * cmath.exp(1j * now.tracker[0, 1, 2])) for now in seen]
+        arm = np.diff(points)[:, 0]
         decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
         off = np.abs(arm) - abs(wanted)
         np.testing.assert_allclose(off, off[0] * decay, atol=allowed)

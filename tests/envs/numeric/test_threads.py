@@ -59,9 +59,6 @@ def test_an_error_propagates_when_no_thread_is_at_work(failing: int) -> None:
 def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
     """Nothing is written afterwards, and all shares are done, or none."""
 
-    def interrupt(*_: object) -> None:
-        signal.raise_signal(signal.SIGINT)
-
     @kernel
     def slow(times: npt.NDArray[np.int64], thread: int, first: int, end: int) -> int:
         for _ in range(300):
@@ -71,7 +68,7 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
 
     interrupted, rng = 0, np.random.default_rng(0)
     slow(np.zeros(8, np.int64), 0, 0, 8)
-    before = signal.signal(signal.SIGALRM, interrupt)
+    before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     gc.disable()  # an exception within a callback of the collector would be lost
     try:
         for _ in range(100):

@@ -6,30 +6,23 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from tests.support.reference.state import Array, Complexes, State, headings, obstacles, positions, working
+from tests.support.reference.state import Array, State, headings, obstacles, positions, working
 
 import posse
-
-
-def is_occluded(eye: complex, goal: complex, centres: Complexes, radii: Array) -> bool:
-    """Return whether a disc intersects the segment between two points."""
-    if not len(radii):
-        return False
-    along = np.clip(((centres - eye) * np.conj(goal - eye)).real / abs(goal - eye) ** 2, 0, 1)
-    return bool((np.abs(eye + along * (goal - eye) - centres) < radii).any())
 
 
 def can_see(s: posse.Scenario, state: State, i: int) -> bool:
     """Return whether tracker i's sensor sees the target."""
     p, h = positions(state), headings(state)
     step, dead = int(state["world_step"]), int(state["tracker_sensor_dead_from"][i])
-    offset = p[-1] - p[i]
+    offset, (centres, radii) = p[-1] - p[i], obstacles(state)
+    along = np.clip(((centres - p[i]) * np.conj(offset)).real / abs(offset) ** 2, 0, 1)  # on the segment to the target
     return bool(
         working(state)[i]
         and not dead <= step < dead + round(s.outage_time / s.control_step)
         and abs(offset) <= s.sensing_range
         and abs(np.angle(offset / h[i])) <= s.field_of_view / 2
-        and not is_occluded(p[i], p[-1], *obstacles(state))
+        and (np.abs(p[i] + along * offset - centres) >= radii).all()
     )
 
 

@@ -8,20 +8,12 @@ import pytest
 from scipy import stats
 
 import posse
-from posse_baselines import from_function
 from posse_baselines.policies.simple import Idle
 from posse_training import evaluate
 from posse_training.errors import SettingsError
 from posse_training.evaluation.statistics import difference, improvement, mean, over_seeds, share
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
-
-
-def test_a_split_that_a_policy_was_trained_on_is_refused() -> None:
-    policy: Any = from_function(np.zeros_like, name="trained")
-    policy.trained_splits = ("train", "validation")
-    with pytest.raises(ValueError, match="'trained' was trained on the split 'validation'"):
-        evaluate(policy, "constant", 1, split="validation", **FAST)
 
 
 def test_scores_are_of_whole_episodes() -> None:
