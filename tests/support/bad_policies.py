@@ -60,7 +60,6 @@ class Watched(BasePolicy):
     """
 
     name = "watched"
-    reads_state = False
 
     def __init__(self, folder: Path, deed: str) -> None:
         self._folder, self._deed, self._pursuit = folder, deed, load("pursuit")

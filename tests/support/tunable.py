@@ -38,9 +38,6 @@ class Biased(DDCS):
     def with_settings(self, **values: Any) -> "Biased":
         return Biased(dataclasses.replace(self.bias, **values))
 
-    def annotations(self, memory: Memory) -> Any:
-        return {}
-
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         actions, memory = super().act(observations, memory)
         actions[..., 1] = np.clip(actions[..., 1] + 2.0 * (self.bias.bias - BEST), -1.0, 1.0)

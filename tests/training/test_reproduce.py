@@ -33,12 +33,9 @@ def test_settling_time_of_a_known_approach() -> None:
     fast = still.copy()
     fast[:50, 1] = 0.7
     assert settling_times(run_with(relative, fast))[0] == pytest.approx(5.0)
-
-
-def test_a_team_that_still_moves_at_the_end_has_not_settled() -> None:
-    relative = np.zeros((81, 1, 2))
-    relative[:, 0, 0] = 0.05 * np.arange(81)
-    assert np.isnan(settling_times(run_with(relative, np.ones((81, 1))))[0])
+    # A team that still moves at the end has not settled.
+    relative[:, 1, 0] = 0.05 * np.arange(81)
+    assert np.isnan(settling_times(run_with(relative, still))[0])
 
 
 def test_starts_are_the_figures() -> None:

@@ -46,7 +46,6 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"metrics": ("score", "score")}, "each once"),
     ({"reward_weights": {"slots": 1.0}}, "did you mean 'slot'"),
     ({"target_reward_weights": {"slot": 1.0}}, "'slot' has no formula for a target"),
-    ({"extra_fields": ("effort",)}, "unknown observation field 'effort'"),
     ({"target_motion": "unwind"}, "import its module first"),
 ]
 

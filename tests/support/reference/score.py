@@ -4,7 +4,6 @@ import math
 from collections import defaultdict
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import connected_components
 from tests.support.reference.motion import free_gaps
@@ -61,11 +60,16 @@ class Episode:
             self._start = p[:n].copy()
         gaps = free_gaps(s, state)
         self._least = min(self._least, float(gaps.min()))
-        self._count_contacts(gaps <= TOUCHING)
+        begun = (touch := gaps <= TOUCHING) & ~self._touch
+        self._touch, self._touched = touch, self._touched or bool(touch.any())
+        self.onsets = begun.sum(axis=1).astype(np.float64)
+        self._sums["tracker_contacts"] += int(begun[:, :n].sum()) // 2
+        self._sums["target_contacts"] += int(begun[:, n].sum())
+        self._sums["obstacle_contacts"] += int(begun[:, n + 1 :].sum())
         frame = complex(state["world_frame_cos"], state["world_frame_sin"])
         places = p[n] + slots(s) * frame
         away = np.abs(p[:n, None] - places[None, :])
-        near = (away <= s.tolerance) & (alive & ~(gaps <= TOUCHING).any(axis=1))[:, None]
+        near = (away <= s.tolerance) & (alive & ~touch.any(axis=1))[:, None]
         rows, columns = linear_sum_assignment(-near.astype(float))
         taken = {int(c) for r, c in zip(rows, columns, strict=True) if near[r, c]}
         self.occupied = {}
@@ -115,15 +119,6 @@ class Episode:
             ("connected", self._connected(state)),
         ):
             self._sums[name] += float(value)
-
-    def _count_contacts(self, touch: npt.NDArray[np.bool_]) -> None:
-        n = self.scenario.num_trackers
-        begun = touch & ~self._touch
-        self._touch, self._touched = touch, self._touched or bool(touch.any())
-        self.onsets = begun.sum(axis=1).astype(np.float64)
-        self._sums["tracker_contacts"] += int(begun[:, :n].sum()) // 2
-        self._sums["target_contacts"] += int(begun[:, n].sum())
-        self._sums["obstacle_contacts"] += int(begun[:, n + 1 :].sum())
 
     def _connected(self, state: State) -> bool:
         s = self.scenario
