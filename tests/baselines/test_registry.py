@@ -27,7 +27,6 @@ SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
         (load, "x" * 5000, "unknown policy"),
         (load, "none.safetensors", "there is no policy file none"),
         (load, __file__, "is not a policy file: known suffixes are"),
-        (load_target, "smrat", "did you mean 'smart'"),
         (load_target, "agent", "unknown target 'agent'"),
         (load_target, __file__, "not a policy file"),
         (load_target, "posse_baselines:load", "lacks begin, act or restart"),
