@@ -41,7 +41,7 @@ def test_a_planner_plays_the_team_mates_and_a_number_of_numpy_is_a_tracker() -> 
 
 @pytest.mark.parametrize("make", [TrackerEnv, partial(gymnasium.make_vec, "posse/Tracker-v0", 3)])
 def test_what_cannot_be_played_is_refused(make: Any) -> None:
-    for number in (5, 1.0):
+    for number in (5, 1.0, True):
         with pytest.raises(posse.ScenarioError, match=f"number={number} is not in the team"):
             make(scenario="constant", number=number)
     with pytest.raises(posse.ScenarioError, match="no team-mates"):

@@ -161,5 +161,5 @@ def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
 
 
 def test_a_copy_has_a_memory_of_its_own() -> None:
-    one = posse.batch(SHORT, WORLDS, target_policy=Weaver())
+    one: Any = posse.batch(SHORT, WORLDS, target_policy=Weaver())
     assert copy.copy(one).memory is not one.memory

@@ -44,7 +44,7 @@ ANGLES |= {"target_heading": "world_heading", "target_frame": "world_frame"}
 def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -> None:
     player_of = load(policy)
     settings = posse.get_scenario(scenario, horizon=150)
-    recorded = record([policy], settings, seed=5, world=2)
+    recorded = record(policy, settings, seed=5, world=2)
     player = decode(encode(recorded)).players[0]
     batch = batch_for(player_of, settings, seed=5, split="test", first_world=2, autoreset="disabled")
     memory, observations = begin(player_of, batch), batch.reset()

@@ -61,7 +61,7 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
 def test_shortened_episodes_are_in_no_statistics_of_sb3() -> None:
     env = make(worlds=4, staggered=True)
     model = PPO("MlpPolicy", env, device="cpu")
-    _, lengths = evaluate_policy(model, env, n_eval_episodes=20, return_episode_rewards=True)
+    lengths: Any = evaluate_policy(model, env, n_eval_episodes=20, return_episode_rewards=True)[1]
     assert set(lengths) == {HORIZON}
 
 
