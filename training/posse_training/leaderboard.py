@@ -131,7 +131,7 @@ def read_standings(path: str | Path) -> list[Standing]:
             rows.append(Standing(**values))
     except (ValueError, KeyError, TypeError, csv.Error) as error:
         raise SettingsError(f"{path}, line {len(rows) + 2}: {error}") from error
-    if len({(row.label, row.scenario) for row in rows}) < len(rows):
+    if len({(row.label, row.scenario, row.version) for row in rows}) < len(rows):
         raise SettingsError(f"{path}: two rows have one label and scenario: rename one")
     return rows
 
