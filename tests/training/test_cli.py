@@ -49,7 +49,7 @@ INVALID = {
     "watch idle --page --out a.gif": "exclude each other",
     "watch idle": "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): posse watch --page",
     "play --as tracker_9": "--as tracker_9 is no robot; there are: tracker_0",
-    "play planner": "plays the target's motion ahead",
+    "play planner": "foresees a scripted target, not a person",
     "play --out play.txt": "'play.txt' must end in .html",
     "record": "no policies given",
     "record idle --set seed=3": "unknown setting 'seed'",

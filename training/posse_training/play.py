@@ -91,7 +91,7 @@ def play(
     scenario = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
     if robot == n:
         if policy.reads_state:
-            raise PolicyError(f"{policy.name!r} plays the target's motion ahead, no person's: choose another policy")
+            raise PolicyError(f"{policy.name!r} foresees a scripted target, not a person: choose another policy")
         scenario = scenario.replace(target_motion="agent")
     elif scenario.num_agents != n:
         raise SettingsError(f"the target of {scenario.name!r} is an agent that nobody drives: play as the target")
