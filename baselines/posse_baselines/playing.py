@@ -123,7 +123,7 @@ class Recorder:
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
-        if "reset_mask" in (options or {}):
+        if isinstance(options, Mapping) and options.get("reset_mask") is not None:
             raise ValueError("reset_mask leaves episodes running, of which the beginning is not recorded: leave it out")
         observations = self.batch.reset(seed=seed, options=options)
         self.over = np.zeros(self.batch.num_worlds, np.bool_)
@@ -157,7 +157,7 @@ class Recorder:
             actions, every = self.batch.everyone
             observations, rewards = every.observations, every.rewards
             terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
-        notes = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
+        notes = {f"annotation/{name}": np.asarray(value) for name, value in (annotations or {}).items()}
         rows_of_all = self.batch.action_shape[:2]
         for name, value in notes.items():
             if value.dtype.kind not in "biuf" or value.shape[:2] != rows_of_all:
@@ -165,7 +165,7 @@ class Recorder:
         rows: dict[str, Array] = {
             "score": infos["score"],
             "rewards": rewards,
-            "actions": np.array(actions, np.float32),
+            "actions": np.asarray(actions, np.float32),
             "terminated": terminated,
             "truncated": truncated,
         }
@@ -183,7 +183,7 @@ class Recorder:
         self._keep({name: state[name] for name in self._names if name in state} | {"observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
-        """Keep the rows that were asked for by name, or by the part of the name before the slash."""
+        """Keep copies of the rows that were asked for by name, or by the part of the name before the slash."""
         for name, row in rows.items():
             if name.partition("/")[0] in self._names:
                 self._rows[name].append(row.copy())

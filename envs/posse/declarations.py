@@ -114,7 +114,7 @@ class Declaration:
             raise DeclarationError(f"{self.kind} {place_of(first)}: {reason}")
 
     def __repr__(self) -> str:
-        return f"<{self.kind} {self.name!r} [{self.unit}]: {self.meaning}>" if "name" in vars(self) else self.kind
+        return f"<{self.kind} {self.name!r} [{self.unit}]: {self.meaning}>" if "function" in vars(self) else self.kind
 
     def __call__(self, function: Function) -> Function:
         """Declare a function, and return it, compiled if kernels call it.

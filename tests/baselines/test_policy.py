@@ -170,6 +170,8 @@ def test_what_cannot_be_recorded_or_played_is_named() -> None:
         rollout(posse.batch("constant", 1), load("idle"), steps=0)
     with pytest.raises(ValueError, match="reset_mask leaves episodes running"):
         rollout(posse.batch("constant", 1), load("idle"), options={"reset_mask": np.array([True])})
+    with pytest.raises(ValueError, match="options must be a dictionary"):
+        rollout(posse.batch("constant", 1), load("idle"), options=5)  # type: ignore[arg-type]
 
 
 def test_a_memory_that_cannot_be_saved_or_restarted_is_refused() -> None:

@@ -147,6 +147,7 @@ def test_a_declaration_is_replaced_for_batches_made_or_unpickled_afterwards(tmp_
 def test_the_generated_source_can_be_read() -> None:
     source = posse.kernel_source("smart")
     compile(source, "kernel", "exec")
+    assert repr(posse.target_motion("own")) == "target motion"
     assert repr(posse.METRICS[0]).startswith("<metric 'score' [1]: Mean over the steps")
     for call in ("field_speed(c, v)", "field_neighbour_age(c, v, m)", "term_slot(c, w, t)", "draw_accelerating(c, w)"):
         assert call in source

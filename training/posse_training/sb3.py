@@ -71,7 +71,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         self._normalize = normalize or model.get_vec_normalize_env()
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
-            raise PolicyError(f"observations {model.observation_space} of a model are no team's: wanted (F,) or (N, F)")
+            raise PolicyError(f"a model of observations {model.observation_space} plays no team: wanted (F,) or (N, F)")
         actions, rows = model.action_space, shape[:-1]
         self._discrete = isinstance(actions, (spaces.Discrete, spaces.MultiDiscrete))
         choices = np.asarray(getattr(actions, "nvec", getattr(actions, "n", 0)))

@@ -150,7 +150,7 @@ def track(team: Team, me: Record, mates: Records, work: Work) -> None:
         me.slot = -1
     elif me.slot < 0 or is_due(team, me, REPLAN_TIME):
         choose_slot(team, me, mates, work)
-    guide = guide_of(team, me, mates)
+    guide = guide_of(team, me, mates)  # read only by who has a slot
     me.task = next_task(team, me, guide)
     move(team, me, mates, guide)
 

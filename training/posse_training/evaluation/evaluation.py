@@ -191,5 +191,5 @@ def progress_bar(*, disable: bool = False, console: Console | None = None) -> Pr
         TimeRemainingColumn(),
         transient=True,
         disable=disable,
-        console=console or Console(force_jupyter=False),  # else without ipywidgets it warns
+        console=console or Console(force_jupyter=False),  # in notebooks it needs ipywidgets
     )

@@ -1,9 +1,9 @@
 """A warm start: the policy begins as a copy of another one.
 
 Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert acts and is copied; in later rounds
-the copy acts in more and more of the worlds, labelled with the expert's actions. The copy is thus right in the states
-that *it* visits. At the end the value function is fitted to the copy's returns; otherwise the first updates would undo
-the copy.
+the copy acts in more and more of the worlds, labelled with the expert's actions; behind the safeguard, with the
+velocities that the expert wants. The copy is thus right in the states that *it* visits. At the end the value function
+is fitted to the copy's returns; otherwise the first updates would undo the copy.
 """
 
 from collections.abc import Callable
@@ -119,7 +119,7 @@ def _play_round(
         if slots.guard is None:
             wanted, memory = expert.act(observations, memory)
             actions = wanted.copy()
-        else:  # what is copied is what it wants before its own safeguard
+        else:  # copied is what it wants, before its own safeguard
             velocities, memory = expert.propose(observations, memory)
             actions, memory = expert.carry_out(observations, memory, np.zeros_like(velocities))
             wanted = np.concatenate([velocities, actions[..., 2:]], axis=2)

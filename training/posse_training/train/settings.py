@@ -144,7 +144,7 @@ class TrainSettings:
 
     # A warm start
     imitate: str | None = None
-    """Policy to begin as a copy of: a name, a file or package.module:Class."""
+    """Policy to copy first: a name, file or package.module:Class; behind the safeguard the DDCS or belief-planner."""
     imitate_rounds: int = number(8, "", 1, 1000)
     """Rounds of play and fit; the copy acts in a growing share of the worlds."""
 
