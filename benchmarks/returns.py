@@ -5,16 +5,19 @@ import numpy as np
 import posse
 from posse_baselines import load, policy_names
 from posse_baselines.playing import rollout
+from posse_training.train.presets import default_settings
 
 CONTACTS = ("world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target")
 
 
-def correlations(policy_name: str, scenario: str, worlds: int = 300) -> tuple[float, float]:
+def correlations(
+    policy_name: str, scenario: str, weights: dict[str, float] | None, worlds: int = 300
+) -> tuple[float, float]:
     """Return the correlations of the return with the safe score: until the first contact, and of the whole episode."""
-    policy = load(policy_name)
-    batch = posse.batch(scenario, worlds, seed=3, split="test", message_size=policy.message_size)
+    policy, weighted = load(policy_name), {} if weights is None else {"reward_weights": weights}
+    batch = posse.batch(scenario, worlds, seed=3, split="test", message_size=policy.message_size, **weighted)
     played = rollout(batch, policy, ["rewards", *CONTACTS])
-    rewards = played["rewards"].mean(axis=-1)
+    rewards = played["rewards"][..., : batch.scenario.num_trackers].mean(axis=-1)
     before = np.stack([played[name] for name in CONTACTS]).sum(axis=0)[:-1] == 0
     safe = played.metrics["safe_score"]
     until, whole = (np.corrcoef(r.sum(axis=0), safe)[0, 1] for r in (np.where(before, rewards, 0.0), rewards))
@@ -22,11 +25,10 @@ def correlations(policy_name: str, scenario: str, worlds: int = 300) -> tuple[fl
 
 
 if __name__ == "__main__":
-    print("| team | scenario | return until the first contact | return of the whole episode |\n|---|---|---|---|")
-    for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field"):
-        for name in (
-            "ddcs-tuned",
-            *(n for n in policy_names() if n in (f"learned-{scenario}", f"corrected-{scenario}")),
-        ):
-            until, whole = correlations(name, scenario)
-            print(f"| `{name}` | `{scenario}` | {until:.2f} | {whole:.2f} |", flush=True)
+    print("| team | scenario | weights | return until the first contact | of the whole episode |\n|---|---|---|---|---|")
+    for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field", "duel", "robots"):
+        shipped = [each for each in policy_names() if each in (f"learned-{scenario}", f"corrected-{scenario}")]
+        for whose, weights in (("scenario", None), ("training", default_settings(scenario).reward_weights)):
+            for name in ("ddcs-tuned", *shipped):
+                until, whole = correlations(name, scenario, weights)
+                print(f"| `{name}` | `{scenario}` | {whose} | {until:.2f} | {whole:.2f} |", flush=True)

@@ -83,7 +83,7 @@ SCENARIOS: Final[dict[str, dict[str, Any]]] = {
     },
     "leader-loss": {
         "version": 2,
-        "meaning": "Only the first tracker sees the target from its slot; it breaks, and another must lead.",
+        "meaning": "Only the first slot has the target in sight; its tracker breaks, and another must lead.",
         "target_motion": "accelerating",
         "tracker_turn_rate": 1.1,
         "target_turn_rate": 0.2,

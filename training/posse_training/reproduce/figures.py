@@ -206,7 +206,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
         axes[1].plot(time[at], error[at, number], lw=1.3, **look_of(number))
     axes[1].axhline(_AWAY, color=GREY, lw=0.8)
     axes[1].set(ylabel="distance from\nthe nearest slot, m", ylim=(0.0, None))
-    extent = (start, end, robots - 0.5, -0.5)
+    extent = (start, end + time[1], robots - 0.5, -0.5)  # what is decided holds for a step
     for axis, name, colours in ((axes[2], "task", _TASK_COLOURS), (axes[3], "leader", COLOURS)):
         known = np.ma.masked_where(~alive[keep].T, told(run, name)[keep, 0].T)
         look = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(colours) - 0.5}
@@ -225,10 +225,10 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
 
 
 def _break_times(run: Trajectory) -> tuple[Floats, Floats]:
-    """Return when each world's leader broke, and when all slots were held again, (E,) s; nan: never."""
+    """Return when each world's leader worked last, and when all slots were held again, (E,) s; nan: never."""
     time, alive = times(run), runs.working(run)
     broken = ~alive.all(axis=2)
-    broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0)], np.nan)
+    broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0) - 1], np.nan)
     off = np.asarray(broken & (alive & (slot_error(run) >= _AWAY)).any(axis=2))  # (T + 1, E)
     recovered = time[np.minimum(runs.first_without(off), run.steps)]
     return broke, np.where(off.any(axis=0) & ~off[-1], recovered, np.nan)
