@@ -33,7 +33,7 @@ def _drawn_outage(c: Record, w: Record, chance: np.float32, looked: int, index: 
 def draw_faults(c: Record, w: Record, trackers: Records) -> None:
     """Draw the faults of an episode."""
     for t in trackers:
-        t.broken_at, t.breaks_at = NEVER, NEVER
+        t.broken_at = NEVER
         t.sensor_dead_from, t.radio_dead_from = NEVER, NEVER
     w.breaks_left, w.break_step = c.breaks, NEVER
     draw_coming_faults(c, w, trackers, 0, 0)
@@ -87,14 +87,13 @@ def apply_faults(c: Record, w: Record, trackers: Records) -> None:
     if c.break_nearest:
         if w.step < w.break_step:
             return
-        nearest, least = -1, np.float32(np.inf)
+        nearest, least = 0, np.float32(np.inf)
         for i, t in enumerate(trackers):
             dx, dy = t.x - w.x, t.y - w.y
             d2 = dx * dx + dy * dy
             if t.broken_at == NEVER and d2 < least:
                 nearest, least = i, d2
-        if nearest >= 0:
-            break_tracker(w, trackers[nearest])
+        break_tracker(w, trackers[nearest])
         w.breaks_left -= 1
         # Several break in sequence, each when it is nearest.
         w.break_step = _drawn_step(c, w, w.step + 1, _BREAKS + w.breaks_left)

@@ -40,10 +40,8 @@ def find_occupied(c: Record, w: Record, trackers: Records, slots: Records, s: Re
         if t.slot < 0 and s.slot[i] >= ZERO:
             t.slot_distance = s.slot_distance[i]
         t.slot_progress -= t.slot_distance
-    w.score = ZERO
-    if w.working > 0:
-        w.score = min(ONE, np.float32(occupied) / np.float32(w.working))
-    w.held = w.held + 1 if w.working > 0 and occupied >= w.working else 0
+    w.score = min(ONE, np.float32(occupied) / np.float32(w.working))  # not all break
+    w.held = w.held + 1 if occupied >= w.working else 0
 
 
 @compiled

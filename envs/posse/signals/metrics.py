@@ -45,7 +45,7 @@ def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32
             if not t.could_arrive:
                 t.could_arrive = could_arrive(c, w, t, slots)
             count += t.could_arrive
-    return np.float32(count) / np.float32(w.working) if w.working > 0 else ZERO
+    return np.float32(count) / np.float32(w.working)
 
 
 @metric("s")

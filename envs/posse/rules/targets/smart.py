@@ -92,7 +92,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
         ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
         if d2 < near * near and ux * ux + uy * uy < slow * slow:
             committed += ONE
-    return (committed + committed) / np.float32(max(w.working, 1)) - ONE
+    return (committed + committed) / np.float32(w.working) - ONE
 
 
 @compiled
