@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import ONE, WIDTH, Lanes, Record, Records, choose, compiled, eight, greater, lesser, root
+from posse.numeric import ONE, WIDTH, Lanes, Record, Records, choose, compiled, eight, lesser, root
 from posse.numeric.lanes import load, load_fields, store, transpose
 from posse.rules.kinematics import in_frame
 from posse.rules.state import BIT, NO_BITS, POSE_AT, Pose
@@ -98,12 +98,6 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
 def num_discs(c: Record) -> int:
     """Return the number of discs of a world: trackers, the target, obstacles."""
     return int(c.num_trackers + 1 + c.num_obstacles)
-
-
-@compiled
-def within_one(value: Lanes) -> Lanes:
-    """Return a cosine or sine, clipped to [-1, 1] against rounding."""
-    return lesser(greater(value, -ONE), ONE)
 
 
 @compiled

@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from posse.declarations import field
-from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
-from posse.rules.discs import within_one
+from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater, lesser
 from posse.scenarios import Scenario
 from posse.scenarios.scenario import FORMATIONS, SLACK, UNLIMITED
 from posse.signals.views import Mate, View, ego
@@ -56,6 +55,12 @@ def setting(name: str) -> None:
     limited.__name__ = name
     limited.__doc__ = f"{declared.meaning[0].upper()}{declared.meaning[1:]}.".replace("inf:", "-1:")
     field(declared.unit, low, high)(limited)
+
+
+@compiled
+def within_one(value: Lanes) -> Lanes:
+    """Return a cosine or sine, clipped to [-1, 1] against rounding."""
+    return lesser(greater(value, -ONE), ONE)
 
 
 # Own motion
