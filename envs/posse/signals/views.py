@@ -39,8 +39,7 @@ from posse.rules.state import (
 @compiled
 def write_block(block: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
     """Write eight columns, the first of them column ``first``, to at most eight rows."""
-    a, b, c, d, e, f, g, h = block
-    a, b, c, d, e, f, g, h = transpose((a, b, c, d, e, f, g, h))
+    a, b, c, d, e, f, g, h = transpose(block)
     # Not in a loop: which of a tuple is meant would be looked up at run time.
     _write_row(a, 0, first, rows)
     _write_row(b, 1, first, rows)
