@@ -4,7 +4,6 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -166,7 +165,7 @@ class TrainSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
-        for message in chain(_misfits(self), _conflicts(self)):
+        for message in _conflicts(self):
             raise SettingsError(message)
 
     @property
@@ -229,8 +228,8 @@ class TrainSettings:
         return cls(**fitted)
 
 
-def _misfits(s: TrainSettings) -> Iterator[str]:
-    """Yield what is wrong with a setting on its own, beyond what it declares."""
+def _conflicts(s: TrainSettings) -> Iterator[str]:
+    """Yield what is wrong with settings beyond what each declares, and why valid ones exclude each other."""
     for name in ("overrides", "reward_weights"):
         if not isinstance(value := getattr(s, name), dict):
             yield f"{name}={value!r:.80} is invalid: it must map names to values"
@@ -240,10 +239,6 @@ def _misfits(s: TrainSettings) -> Iterator[str]:
         value = getattr(s, name)
         if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):
             yield f"{name}={value!r:.80} is invalid: it must be whole numbers of at least 1, such as 64,64"
-
-
-def _conflicts(s: TrainSettings) -> Iterator[str]:
-    """Yield why settings that are valid on their own exclude each other."""
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
         yield f"final_log_deviation={s.final_log_deviation} must not exceed log_deviation={s.log_deviation}: lower it"
     own, other = ("target", "team") if s.side == "target" else ("team", "target")
