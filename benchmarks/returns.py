@@ -25,7 +25,7 @@ def correlations(
 
 
 if __name__ == "__main__":
-    print("| team | scenario | weights | return until the first contact | of the whole episode |\n|---|---|---|---|---|")
+    print("| team | scenario | weights | return until the first contact | of the episode |\n|---|---|---|---|---|")
     for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field", "duel", "robots"):
         shipped = [each for each in policy_names() if each in (f"learned-{scenario}", f"corrected-{scenario}")]
         for whose, weights in (("scenario", None), ("training", default_settings(scenario).reward_weights)):

@@ -27,6 +27,8 @@ class deploy:  # noqa: N801 (used as a function is)
             raise PolicyError(f"policy {policy.name!r} reads the observations of all trackers, and a robot has its own")
         self.policy, self.robot = policy, robot
         self.reset()
+        self.step((0.0, 0.0, 0.0), 0.0, 0.0)  # compiles, which would halt a control loop
+        self.reset()
 
     def reset(self) -> None:
         """Begin an episode: robot and policy forget everything."""

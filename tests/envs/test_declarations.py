@@ -44,6 +44,9 @@ MISTAKES: Final = {
     FIELD.format('"1", 0, lambda s: s.sped', "c, v", "v.x"): r"high in 'constant': .*no attribute 'sped'",
     FIELD.format('"1", 1, 0', "c, v", "v.x"): r"low=1 is above high=0",
     FIELD.format('"1", 0, 1', "c, v", "v.x / 0.0"): r"it returned \S+, which is not from low=0 to high=1",
+    FIELD.format('"m", -99, 99', "c, v", "posse.numeric.choose(v.step > 0.5, v.x / 0.0, v.x)")
+    .replace("posse.batch", "b = posse.batch").replace(".reset()", "\nb.reset()\nb.step(np.zeros(b.action_shape))"):
+        r"own \(main.py:1\): it returned \S+, which is not from low=-99",
     MOTION.format(", memory=3", "", "pass"): r"memory=3 must be a list of names",
     MOTION.format(', memory=["if"]', "", "pass"): r"invalid name 'if' of a memory",
     MOTION.format(', memory=["speed"]', "", "pass"): r"a world has a field 'speed'",

@@ -195,7 +195,7 @@ MIND: Final = record(
     waiting=np.zeros(_MOST_WAITING, np.complex128),
     # leadership
     leader=_I(-1),  # -1: none yet
-    term=_I(0),  # how often the lead has passed, modulo 256; the higher claim wins
+    term=_I(0),  # of its claim to know the leader, modulo 256; the higher one wins
     pulse=_I(0),  # the leader counts its steps, modulo 256; team-mates pass the count on
     pulse_step=_I(0),  # own step at which the count last went up
     confirmed=_I(0),  # 0: the leader has not been heard of since it was appointed

@@ -40,7 +40,6 @@ class BatchEnv:
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
-    closed: bool = False
     _rows: int | slice = slice(None)
     """The robots that an agent moves, as rows of the batch: one, or all."""
     _fit: Callable[..., Scenario] = staticmethod(get_scenario)

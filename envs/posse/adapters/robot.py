@@ -12,7 +12,7 @@ from posse.declarations import SENSORS, is_number
 from posse.engine.arguments import MOST_ACTION, real_numbers
 from posse.engine.batch import Batch
 from posse.engine.kernels import START
-from posse.numeric import FloatArray
+from posse.numeric import FloatArray, Records, kernel
 from posse.rules.kinematics import follow_heading
 from posse.rules.senses.sensing import take_fix
 from posse.rules.state import BROADCAST
@@ -109,10 +109,8 @@ class Robot:
         if kept.perfect_radio:  # such a world stores no messages, since they would equal the state
             kept = kept.replace(radio_loss=_BARELY_LOSSY)
         self._world = Batch(kept, 1, num_threads=1)
-        self._config = self._world._fixed.config[0]
         self.reset()
-        for _ in range(2):  # what takes a first and a later fix is compiled now: it would halt a control loop
-            self.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0))
+        self.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0))  # compiles, which would halt a control loop
         self.reset()
 
     def reset(self) -> None:
@@ -273,18 +271,13 @@ class Robot:
             return
         if step == me.fix_step:  # both are older than the first observation
             me.fix_step = -1
-        new, config = np.zeros(1, BROADCAST)[0], self._config
-        new.fix_step, f = step, new.fix
-        _place(f, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
-        f.frame_cos, f.frame_sin = f.cos, f.sin
-        if fix.frame is not None:
-            f.frame_cos, f.frame_sin = math.cos(fix.frame), math.sin(fix.frame)
-        elif me.fix_step >= 0:
-            f.frame_cos, f.frame_sin = me.fix.frame_cos, me.fix.frame_sin
-            most = config.frame_c, config.frame_s
-            for _ in range(step - int(me.fix_step)):
-                f.frame_cos, f.frame_sin = follow_heading(f.frame_cos, f.frame_sin, f.cos, f.sin, *most)
-        take_fix(config, me, new)
+        new = np.zeros(1, BROADCAST)
+        new["fix_step"] = step
+        _place(new[0].fix, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
+        frame = fix.heading if fix.frame is None else fix.frame
+        new[0].fix.frame_cos, new[0].fix.frame_sin = math.cos(frame), math.sin(frame)
+        trackers = self._world.arrays.tracker[0]
+        _keep(self._world._fixed.config, trackers, self.number, new, fix.frame is None)
 
     def _hear(self, message: Heard) -> None:
         """Store a message, unless a later one of the same team-mate was heard."""
@@ -295,6 +288,18 @@ class Robot:
             _place(heard, message.x * self.scale, message.y * self.scale, message.heading)
             heard.speed, heard.turn_rate = message.speed * self.scale, message.turn_rate
             arrays.heard_message[0, self.number, message.number] = message.message or 0.0
+
+
+@kernel
+def _keep(config: Records, trackers: Records, number: int, news: Records, follows: bool) -> None:
+    """Take the one fix of ``news``; if its slot frame ``follows``, that turns from the last one to its heading."""
+    c, t, new = config[0], trackers[number], news[0]
+    if follows and t.fix_step >= 0:
+        cos, sin = t.fix.frame_cos, t.fix.frame_sin
+        for _ in range(new.fix_step - t.fix_step):
+            cos, sin = follow_heading(cos, sin, new.fix.cos, new.fix.sin, c.frame_c, c.frame_s)
+        new.fix.frame_cos, new.fix.frame_sin = cos, sin
+    take_fix(c, t, new)
 
 
 def _place(record: Any, x: float, y: float, heading: float, prefix: str = "heading_") -> None:

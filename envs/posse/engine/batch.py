@@ -120,7 +120,8 @@ class Batch(OwnArrays):
         """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = Declarations.of(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
-        self._own_rules = not all(rule.built_in for rule in (*self._declared.motions, *self._declared.sensors))
+        observed = (*self._declared.motions, *self._declared.sensors, *self._declared.fields)
+        self._own_rules = not all(each.built_in for each in observed)
         self._kernel = direct(kernel_of(self._declared))
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
@@ -384,6 +385,7 @@ class Batch(OwnArrays):
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
         if self._own_rules and not np.isfinite(results.observations).all():
+            self.layout.check_added(results.observations)
             s = self.scenario
             raise DeclarationError(
                 f"an observation is not finite: see what target_motion={s.target_motion!r} sets, and what "

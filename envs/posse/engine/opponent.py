@@ -58,8 +58,8 @@ class PairedBatch(Batch):
 
     Attributes:
         memory: Memory of the policy inside, which is restarted when it acts in a world that is at its start.
-        everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), the target's row
-            last.
+        everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), with the present
+            observations; the target's row last.
         observation_shape: (E, rows, F).
         action_shape: (E, N, 2 + message_size); (E, 1, 2) for the target or one tracker, which send no messages.
     """

@@ -1,7 +1,7 @@
 """Positions of all discs of a world, laid out for processing in blocks of eight.
 
-Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch memory. Contact, score, target sensor
-and sonar read these rows in blocks of eight (:mod:`posse.numeric.lanes`); the padding of the last block is far away.
+Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch memory. Contact, motion, score, target
+sensor and sonar read them in blocks of eight (:mod:`posse.numeric.lanes`); the padding of the last block is far away.
 """
 
 from typing import Final

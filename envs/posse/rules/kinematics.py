@@ -1,7 +1,7 @@
 """Unicycle motion, equations (2-1) to (2-3) of the paper, integrated exactly.
 
 With constant (V, ω) a robot moves on a circular arc. Headings are stored as (cos θ, sin θ), so a
-step needs no trigonometric function: the turn in one step is at most 1 rad (checked with the
+step needs no trigonometric function: the turn in a physics step is at most 1 rad (checked with the
 scenario), for which a short polynomial is exact to float32 rounding.
 """
 

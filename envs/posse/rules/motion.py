@@ -82,8 +82,8 @@ def motion(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, set_goal
 
     Actions of trackers wait in ``worlds.command`` for the delay.
 
-    A robot with nothing near moves on one arc, or with limited acceleration on one per physics
-    step; a robot with something near moves in swept physics steps.
+    A robot with nothing near moves on one arc, or on one per physics step if its motion changes in the control step or
+    it turns by more than 1 rad; a robot with something near moves in swept physics steps.
     """
     w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
     wanted = actions

@@ -2,7 +2,6 @@
 
 At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
 a working tracker that touches nothing is within tolerance of it; any tracker may occupy any slot.
-For the safe score, steps count only until the first contact of any tracker.
 """
 
 import numpy as np

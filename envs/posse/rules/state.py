@@ -22,7 +22,7 @@ import numpy.typing as npt
 from posse.declarations import SENSORS, TARGET_MOTIONS, Declarations
 from posse.numeric import WIDTH, FloatArray, Lanes, Records, record_type
 from posse.scenarios import Scenario
-from posse.scenarios.scenario import FORMATIONS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN, UNLIMITED
+from posse.scenarios.scenario import FORMATIONS, MAX_BEAMS, MAX_OBSTACLES, MAX_TRACKERS, SAFE_MARGIN, UNLIMITED
 
 BIT: Final = np.uint64(1)
 NO_BITS: Final = np.uint64(0)
@@ -398,7 +398,6 @@ ROBOTS: Final = TEAM + WIDTH
 """Length of rows of trackers, target and padding."""
 DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
 """Length of rows of robots, obstacles and padding."""
-BEAMS: Final = 64
 
 SCRATCH: Final = record_type(
     # Discs: trackers, the target, obstacles.
@@ -407,9 +406,9 @@ SCRATCH: Final = record_type(
     ("radius", _F, DISCS),  # m
     ("index", _F, ROBOTS),  # 0, 1, 2, …
     # The sonar's beams.
-    ("beam_cos", _F, BEAMS),
-    ("beam_sin", _F, BEAMS),
-    ("reading", _F, BEAMS),  # m
+    ("beam_cos", _F, MAX_BEAMS),
+    ("beam_sin", _F, MAX_BEAMS),
+    ("reading", _F, MAX_BEAMS),  # m
     # Trackers.
     ("gap", _F, TEAM),  # clearance to the nearest disc, m
     ("excess", _F, TEAM),  # above 0 only if nothing is near; a sign alone, m² to robots and m to obstacles

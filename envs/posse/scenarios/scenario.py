@@ -36,6 +36,7 @@ from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
 # The limits of all scenarios, including those of float32.
+MAX_BEAMS: Final = 64
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word
 MAX_OBSTACLES: Final = 60  # the four walls use the last bits
 
@@ -117,7 +118,7 @@ class Scenario:
 
     # The formation
     formation: str = setting(
-        "wedge", "wedge (paper, figure 6): behind the target; ring: around it; rows: a block behind", choices=FORMATIONS
+        "wedge", "wedge: behind the target, as in the paper; ring: around it; rows: a block behind", choices=FORMATIONS
     )
     formation_distance: float = setting(
         1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, FARTHEST, above=True
@@ -179,7 +180,7 @@ class Scenario:
         0.0, "random walk of a tracker's own position, which it observes and broadcasts", "m/√s", 0, 1
     )
     heading_drift: float = setting(0.0, "the same of its own heading", "rad/√s", 0, 1)
-    sonar_beams: int = setting(8, "beams of the sonar ring, evenly spaced from straight ahead", "1", 0, 64)
+    sonar_beams: int = setting(8, "beams of the sonar ring, evenly spaced from straight ahead", "1", 0, MAX_BEAMS)
     sonar_range: float = setting(2.0, "range of the sonar, from the robot's rim", "m", SMALL, WIDE)
 
     # Radio

@@ -24,7 +24,7 @@ from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
 WORLDS: Final = 500
-"""Worlds that are played at once; on a cluster a shard. No policy that ships depends on it."""
+"""Worlds that are played at once; on a cluster a shard. What shipped policies do is the same with any."""
 FAILURES: Final = (PlayError, SettingsError, ScenarioError)  # of one that plays; with a PolicyError it does not fit
 
 

@@ -33,7 +33,7 @@ _FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by
 _LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
 _LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
 _DART_MOMENTS: Final = 6  # time samples of a simulated dart
-_DART_TURNS: Final = np.float32(4.0)  # times the target's turn rate; faster turns are simulated as this, for arc()
+_DART_TURNS: Final = np.float32(4.0)  # times the target's turn rate at most: arc() errs by 1e-4 there
 _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
 _DART_STRIDE: Final = 2  # every second direction is simulated
@@ -139,7 +139,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
 
 @compiled
 def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
-    """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
+    """Return for how long, at most ``_LOOKOUT``, a direction is free, s; negative too near a wall."""
     far = c.target_speed * _LOOKOUT
     inner = c.half_width - c.safe_distance
     if abs(ux) > TINY:
