@@ -196,7 +196,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     figure, axes = subplots(4, 1, (8.4, 8.2), gridspec_kw={"height_ratios": (2.6, 2, 1, 1)})
     start = max(0.0, broke - 5.0)
     end = min(time[-1], max(recovered, broke) + 5.0)
-    keep = (time >= start) & (time <= end)
+    keep = (time > start - 0.5 * time[1]) & (time < end + 0.5 * time[1])  # with the frames at either end
     draw_robots(axes[0], run, *(int(np.searchsorted(time, when)) for when in (broke, start)))
     axes[0].set_title(f"{policy}: the leader (thick rim) breaks at {broke:.1f} s", loc="left")
     axes[0].set(xlabel="x, m", ylabel="y, m")
