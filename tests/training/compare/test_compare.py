@@ -16,7 +16,7 @@ from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.commands import watch
-from posse_training.compare.compare import SUMMARY, Settings, compare
+from posse_training.compare.compare import SUMMARY, CompareSettings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError, SettingsError
@@ -33,7 +33,7 @@ def safe_scores(rows: Path) -> Any:
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     names = ("idle", "pursuit")
-    rows = compare(Settings(names, ("constant",), 20, out=tmp_path, export=("marl-eval",), **ALONE)).rows
+    rows = compare(CompareSettings(names, ("constant",), 20, out=tmp_path, export=("marl-eval",), **ALONE)).rows
     scores = {name: safe_scores(tmp_path / f"constant-{name}.csv") for name in names}
     assert rows[0]["difference"] is None
     gap = scores["pursuit"] - scores["idle"]
@@ -49,7 +49,7 @@ def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
 
 def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
     policies, few = ("idle", "pursuit", "ddcs-distributed"), {**ALONE, "planner_episodes": 2}
-    found = compare(Settings(policies, ("smart",), 4, out=tmp_path, **few))
+    found = compare(CompareSettings(policies, ("smart",), 4, out=tmp_path, **few))
     assert [row["policy"] for row in found.rows][-1] == "planner"
     safe = {row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows}
     assert len(safe["planner"]) == 2, "it plays the first worlds of the others"
@@ -89,7 +89,7 @@ def files(tmp_path: Path) -> list[str]:
 
 def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
     group = f"mine={','.join(files)}"
-    found = compare(Settings(("pursuit", group), ("constant",), 15, out=tmp_path / "out", **ALONE))
+    found = compare(CompareSettings(("pursuit", group), ("constant",), 15, out=tmp_path / "out", **ALONE))
     assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
     scores = np.stack([safe_scores(tmp_path / "out" / f"constant-mine-{k}.csv") for k in (1, 2, 3)])
     assert len({tuple(row) for row in scores}) == 3
@@ -98,7 +98,7 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
     better = (scores > reference) + 0.5 * (scores == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
     with pytest.raises(PolicyError, match="names a policy twice"):
-        compare(Settings((f"two={files[0]},{tmp_path}/../{tmp_path.name}/0.safetensors",), ("constant",), 1))
+        compare(CompareSettings((f"two={files[0]},{tmp_path}/../{tmp_path.name}/0.safetensors",), ("constant",), 1))
 
 
 def test_a_policy_that_cannot_play_is_left_out_with_a_line(
@@ -135,10 +135,13 @@ def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> Non
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     for out in (tmp_path, tmp_path / "mine.txt"):
         with pytest.raises(RunFolderError, match="not an empty folder"):
-            compare(Settings(("idle",), ("constant",), out=out))
+            compare(CompareSettings(("idle",), ("constant",), out=out))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
     with locked(tmp_path / "busy"):
-        for play in (lambda out: compare(Settings(("idle",), ("constant",), out=out)), lambda out: submit("idle", out)):
+        for play in (
+            lambda out: compare(CompareSettings(("idle",), ("constant",), out=out)),
+            lambda out: submit("idle", out),
+        ):
             with pytest.raises(RunFolderError, match=r"process \d+ uses"):
                 play(tmp_path / "busy")
 
@@ -177,7 +180,7 @@ def test_an_evaluation_is_the_same_alone_and_its_files_name_target_and_settings(
 def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: Path) -> None:
     code = "posse_baselines.policies.simple:Idle"
     made: dict[str, Any] = {"out": tmp_path / "out", "figures": False, "planner_episodes": 1, "target": str(file)}
-    found = compare(Settings(("ddcs-distributed", code), ("smart",), episodes=2, **made))
+    found = compare(CompareSettings(("ddcs-distributed", code), ("smart",), episodes=2, **made))
     played = {plays.results[0].target for plays in found.plays.values()}
     assert played == {"evading"}
     assert len(found.plays) == 2, "also in the process of a policy that is code"
@@ -188,7 +191,7 @@ def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: 
 def test_a_target_that_dies_while_it_is_imported_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "dying_target.py").write_text("import os\n\nos._exit(3)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    settings = Settings(("pursuit",), ("smart",), 2, out=tmp_path / "out", target="dying_target:Own", **ALONE)
+    settings = CompareSettings(("pursuit",), ("smart",), 2, out=tmp_path / "out", target="dying_target:Own", **ALONE)
     with pytest.raises(SettingsError, match=r"target='dying_target:Own' cannot be loaded: .* ended with exit code 3"):
         compare(settings)
     assert not (tmp_path / "out").exists()

@@ -8,7 +8,7 @@ import pytest
 
 from posse_training import evaluate
 from posse_training.cli import main
-from posse_training.compare.compare import Settings, compare
+from posse_training.compare.compare import CompareSettings, compare
 
 BAD = "tests.support.bad_policies:"
 OPTIONS = ["--scenario", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
@@ -21,9 +21,9 @@ def compiled() -> None:
         evaluate(policy, "constant", 2, progress=False)
 
 
-def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
+def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> CompareSettings:
     policies = ("idle", *(f"{BAD}{name}" for name in names), "pursuit")
-    return Settings(
+    return CompareSettings(
         policies, ("constant",), episodes=2, out=tmp_path / "out", figures=False, planner_episodes=0, time_limit=limit
     )
 

@@ -9,7 +9,7 @@ from tests.support.browser import Tags
 
 import posse
 from posse_training.compare import figures
-from posse_training.compare.compare import Comparison, Settings, compare
+from posse_training.compare.compare import CompareSettings, Comparison, compare
 from posse_training.compare.contenders import Plays
 from posse_training.compare.report import extremes
 from posse_training.evaluation.results import Results
@@ -27,7 +27,7 @@ def page_of(found: Comparison) -> Tags:
 def found(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     policies = ("pursuit", f"{HOSTILE}=ddcs-distributed", "idle")
     out = tmp_path_factory.mktemp("compared")
-    return compare(Settings(policies, ("constant",), episodes=3, out=out, planner_episodes=0, replays=2))
+    return compare(CompareSettings(policies, ("constant",), episodes=3, out=out, planner_episodes=0, replays=2))
 
 
 def test_it_holds_all_estimates_and_figures_and_a_hostile_label_is_text(found: Comparison) -> None:

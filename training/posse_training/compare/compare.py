@@ -52,7 +52,7 @@ Key = tuple[str, str, int]
 
 
 @dataclass(frozen=True)
-class Settings:
+class CompareSettings:
     """Score policies on the same worlds; write tables, figures and a report page."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
@@ -92,7 +92,7 @@ class Settings:
     """Settings to change in each scenario, such as num_trackers=3 or arena=6,4, which is a range of a family."""
 
 
-def compare(settings: Settings, *, console: Console | None = None) -> "Comparison":
+def compare(settings: CompareSettings, *, console: Console | None = None) -> "Comparison":
     """Evaluate all policies; write rows, summary, figures and report.
 
     A policy that is incompatible with a scenario is omitted there; one that fails is listed under ``failed``. The
@@ -131,7 +131,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> "Compariso
     return found
 
 
-def _checked(settings: Settings) -> list[Scenario | Family]:
+def _checked(settings: CompareSettings) -> list[Scenario | Family]:
     check_settings(settings)
     refuse_two_targets(settings.target, settings.overrides)
     if not settings.scenario:
@@ -163,7 +163,7 @@ def _new_folder(out: Path | None) -> Path:
 class Comparison:
     """A comparison: what is played, and what has been found so far."""
 
-    settings: Settings
+    settings: CompareSettings
     scenarios: Sequence[Scenario | Family]
     contenders: Sequence[Contender]
     folder: Path = field(init=False)
@@ -331,7 +331,7 @@ class Comparison:
         return name, ""
 
 
-def _facts(settings: Settings) -> str:
+def _facts(settings: CompareSettings) -> str:
     target = "" if settings.target is None else f"target {settings.target}, "
     target += "".join(f"{word}, " for word in words_of(settings.overrides))
     return f"{settings.episodes:,} worlds each, {target}split {settings.split}, seed {settings.seed}"
@@ -339,7 +339,7 @@ def _facts(settings: Settings) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare policies, print the table, and return 1 if a policy failed or none played, else 0."""
-    settings = tyro.cli(Settings, prog="posse compare", args=arguments)
+    settings = tyro.cli(CompareSettings, prog="posse compare", args=arguments)
     found = compare(settings)
     console = Console()
     title = f"{_facts(settings)}; 95 % intervals; differences of the safe score to {found.reference}, paired by world"
