@@ -11,6 +11,7 @@ from gymnasium.error import ResetNeeded
 
 import posse
 from posse import Batch, ObservationLayout, PairedBatch, Scenario, get_scenario
+from posse.declarations import is_number
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
 from posse_baselines.registry import Target
@@ -260,7 +261,7 @@ def rollout(
             different steps with autoreset disabled.
         ValueError: An unknown name to record, or ``steps`` that are no whole number of at least 1.
     """
-    if steps is not None and (steps < 1 or steps != int(steps)):
+    if steps is not None and not (is_number(steps) and steps >= 1 and steps == int(steps)):
         raise ValueError(f"steps={steps!r} must be a whole number of at least 1")
     recorder = Recorder(_moving(batch), record)
     memory = begin(policy, batch)

@@ -166,8 +166,9 @@ def test_what_cannot_be_recorded_or_played_is_named() -> None:
         rollout(posse.batch("constant", 1), load("idle"), ["speed"])
     with pytest.raises(ValueError, match="autoreset='same_step'"):
         rollout(posse.batch("constant", 1, autoreset="same_step"), load("idle"), ["tracker_x"])
-    with pytest.raises(ValueError, match="steps=0 must be"):
-        rollout(posse.batch("constant", 1), load("idle"), steps=0)
+    for steps in (0, "3", np.inf):
+        with pytest.raises(ValueError, match=rf"steps={steps!r} must be"):
+            rollout(posse.batch("constant", 1), load("idle"), steps=steps)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="reset_mask leaves episodes running"):
         rollout(posse.batch("constant", 1), load("idle"), options={"reset_mask": np.array([True])})
     with pytest.raises(ValueError, match="options must be a dictionary"):

@@ -153,12 +153,15 @@ def test_invalid_measurements_are_refused() -> None:
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5)]), "a message of 1"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, 1.0), "fix=1.0 must be"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, [1.0]), f"{beams} distances"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, ["1"] * beams), "sonar"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0)), "give a list of posse.Heard"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(1, 0.0, 0.0, 0.0, 0.0, 0.0)]), "no team-mate"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, (1.0,))]), "wanted 0 numbers"),
     ):
         with pytest.raises(ValueError, match=words):
             robot.observe(*measured)
+    with pytest.raises(ValueError, match="touching"):
+        robot.observe((3.0, 0.0, 0.0), 0.0, 0.0, touching=np.array([0, 1]))  # type: ignore[arg-type]
     assert robot.steps == 0
     robot.reset()
     np.testing.assert_array_equal(robot.observe((0.0, 0.0, 0.0), 0.1, 0.0), before)

@@ -165,9 +165,9 @@ class Robot:
         if max(abs(x), abs(y)) * self.scale > self._farthest:
             inside = f"{self.scenario.name!r} reaches {self._farthest / self.scale:.3g} m from its middle"
             warnings.warn(f"the pose lies outside: {inside}; check the frame, the unit and scale", stacklevel=2)
-        speed, turn_rate = _finite("speed and turn_rate", (speed, turn_rate), (2,))
+        speed, turn_rate, touched = _finite("speed, turn_rate and touching", (speed, turn_rate, touching), (3,))
         beams = self.scenario.sonar_beams
-        readings = None if sonar is None else np.asarray(sonar, np.float64)
+        readings = None if sonar is None else real_numbers("sonar", sonar).astype(np.float64)
         if readings is not None and (readings.shape != (beams,) or not readings.min(initial=0.0) >= 0.0):
             raise ValueError(f"sonar={sonar!r} must be {beams} distances of at least 0 m")
         messages = [self._checked(message) for message in heard or ()]
@@ -178,7 +178,7 @@ class Robot:
         world.step = self.steps
         self._pose = (x, y, heading)
         _place(me, x * self.scale, y * self.scale, heading)
-        me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, bool(touching), fix is not None
+        me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, touched != 0, fix is not None
         for message in messages:
             self._hear(message)
         if fix is not None:

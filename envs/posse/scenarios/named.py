@@ -154,7 +154,7 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif scenario in tuple(SCENARIOS):  # also of what is not hashable
+    elif isinstance(scenario, str) and scenario in SCENARIOS:  # type: ignore[redundant-expr]
         found = Scenario(name=scenario, **SCENARIOS[scenario])
     else:
         families = "; families, as those of posse.family_names(), are for posse.batches, compare, tune and train"

@@ -19,6 +19,7 @@ WHOLE = r"must be a whole number in"
 
 OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
     ({"scenario": "smrt"}, r"unknown scenario 'smrt' \(did you mean .*'smart'"),
+    ({"scenario": np.zeros(2)}, r"unknown scenario array"),
     ({"num_tracker": 1}, r"unknown setting 'num_tracker'.*did you mean 'num_trackers'"),
     ({"split": "tests"}, r"unknown split .tests.*known: train"),
     ({"split": np.zeros(2)}, r"unknown split array"),
