@@ -119,7 +119,7 @@ def prepare(
 ) -> Evaluation:
     """Return an evaluation; arguments and errors are those of :func:`evaluate`, and a time limit of code, s."""
     if not is_number(episodes) or episodes < 1 or episodes != int(episodes):
-        raise SettingsError(f"episodes={episodes} must be a whole number of at least 1")
+        raise SettingsError(f"episodes={episodes!r} must be a whole number of at least 1")
     loaded = load(policy)
     opponent = None if target is None else load_target(target)
     for player in (loaded, opponent):
