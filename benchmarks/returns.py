@@ -1,5 +1,7 @@
 """How the return of a training and the safe score go together, over test worlds: python benchmarks/returns.py."""
 
+from typing import Any
+
 import numpy as np
 
 import posse
@@ -14,7 +16,8 @@ def correlations(
     policy_name: str, scenario: str, weights: dict[str, float] | None, worlds: int = 300
 ) -> tuple[float, float]:
     """Return the correlations of the return with the safe score: until the first contact, and of the whole episode."""
-    policy, weighted = load(policy_name), {} if weights is None else {"reward_weights": weights}
+    policy = load(policy_name)
+    weighted: dict[str, Any] = {} if weights is None else {"reward_weights": weights}
     batch = posse.batch(scenario, worlds, seed=3, split="test", message_size=policy.message_size, **weighted)
     played = rollout(batch, policy, ["rewards", *CONTACTS])
     rewards = played["rewards"][..., : batch.scenario.num_trackers].mean(axis=-1)
