@@ -69,6 +69,7 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
     interrupted, rng = 0, np.random.default_rng(0)
     slow(np.zeros(8, np.int64), 0, 0, 8)
     before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    interrupts = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background jobs
     gc.disable()  # an exception within a callback of the collector would be lost
     try:
         for _ in range(100):
@@ -86,6 +87,7 @@ def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGINT, interrupts)
         gc.enable()
     assert interrupted == 100
 
