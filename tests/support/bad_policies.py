@@ -38,6 +38,11 @@ class Builds(Idle):
         raise get_scenario("nope")  # type: ignore[misc]
 
 
+class Untold(Idle):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        raise type("Untold", (Exception,), {"__str__": lambda self: self.detail})
+
+
 class Hangs(Idle):
     """Writes its process id, and hangs in native code that holds the interpreter's lock: no thread can stop it."""
 

@@ -137,7 +137,7 @@ def test_the_command_trains_and_resumes(tmp_path: Path, capsys: pytest.CaptureFi
     watch, compare, replay = (shlex.split(line) for line in after.splitlines())
     assert (watch[1], compare[1], replay[1]) == ("watch", "compare", "replay")
     assert (folder / "best.safetensors") == Path(watch[2]) == Path(compare[3]) == Path(replay[3])
-    assert compare[-3:] == ["--set", "horizon=40", "settle_time=1.0"]
+    assert compare[-4:] == ["--set", "horizon=40", "settle_time=1.0", "num_trackers=2"]
     assert main([*replay[1:], "--seconds", "1"]) == 0
     assert (folder / "replay.html").is_file()
     settings = json.loads((folder / "settings.json").read_text())

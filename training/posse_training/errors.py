@@ -70,4 +70,5 @@ def describe(error: BaseException) -> str:
     ours = tuple(f"{Path(spec.origin).parent}{os.sep}" for spec in found if spec is not None and spec.origin)
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
     where = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {' '.join(str(error).split()):.300}{where}"
+    told = traceback.format_exception_only(error)[-isinstance(error, SyntaxError)]  # also where its text fails
+    return f"{type(error).__name__}: {' '.join(told.partition(': ')[2].split()):.300}{where}"

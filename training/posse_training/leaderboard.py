@@ -161,7 +161,7 @@ def submit(
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     content = Path(policy).read_bytes() if is_file else b""  # before it plays: a training may replace the file
     text = Path(policy).name if is_file else policy
-    label = name or (loaded.name if is_file else policy)
+    label = name if name is not None else loaded.name if is_file else policy
     check_texts(name=label, policy=text)
     check_label(label, text)
     prepare(loaded, get_scenario(scenario), episodes, SEED)  # a family has no standings

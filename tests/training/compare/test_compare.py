@@ -32,19 +32,21 @@ def safe_scores(rows: Path) -> Any:
 
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
-    names = ("idle", "pursuit")
+    names = ("idle", "ddcs-distributed")
     rows = compare(CompareSettings(names, ("constant",), 20, out=tmp_path, export=("marl-eval",), **ALONE)).rows
     scores = {name: safe_scores(tmp_path / f"constant-{name}.csv") for name in names}
     assert rows[0]["difference"] is None
-    gap = scores["pursuit"] - scores["idle"]
+    gap = scores["ddcs-distributed"] - scores["idle"]
     assert rows[1]["difference"].value == pytest.approx(gap.mean())
     assert rows[1]["improvement"].value == pytest.approx(((gap > 0) + 0.5 * (gap == 0)).mean())
     assert rows[1]["difference"].count == 20
     written = json.loads((tmp_path / "summary.json").read_text())
-    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(scores["pursuit"].mean())
+    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(scores["ddcs-distributed"].mean())
     assert (written["seed"], written["split"]) == (7, "test")
-    exported = json.loads((tmp_path / "marl-eval.json").read_text())["posse"]["constant"]["pursuit"]["seed_0"]
-    assert exported["absolute_metrics"]["safe_score"] == exported["step_0"]["safe_score"] == list(scores["pursuit"])
+    runs = json.loads((tmp_path / "marl-eval.json").read_text())["posse"]["constant"]
+    exported, safe = runs["ddcs-distributed"]["seed_0"], list(scores["ddcs-distributed"])
+    assert exported["step_0"].keys() == runs["idle"]["seed_0"]["step_0"].keys()
+    assert exported["absolute_metrics"]["safe_score"] == exported["step_0"]["safe_score"] == safe
 
 
 def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:

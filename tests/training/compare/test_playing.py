@@ -30,7 +30,7 @@ def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> CompareSet
 
 @pytest.mark.long
 def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
-    names = ("Raises", "Nan", "Builds", "Crashes")
+    names = ("Raises", "Nan", "Builds", "Untold", "Crashes")
     settings = settings_for(tmp_path, *names)
     same = "posse_baselines.policies.simple:Pursuit"
     found = compare(replace(settings, policies=(*settings.policies, same)))
@@ -41,6 +41,7 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     assert "bad_policies.py, line" in why["Raises"]
     assert "nan" in why["Nan"]
     assert "unknown scenario 'nope'" in why["Builds"]
+    assert "Untold: <exception str() failed>" in why["Untold"]
     assert "exit code 9" in why["Crashes"]
     beaten = compare(replace(settings_for(tmp_path / "target"), target=f"{BAD}Crashes"))
     assert ["exit code 9" in row["why"] for row in beaten.failed] == [True, True]

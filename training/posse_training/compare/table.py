@@ -89,15 +89,17 @@ def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
     """Write everything that was played in the JSON layout that marl-eval reads, and from it rliable.
 
     The environment is posse, a task a scenario, an algorithm a policy, a run one of its training seeds, and each metric
-    a list with one value for each world. Times that some episodes lack are left out, since JSON has no nan.
+    a list with one value for each world: all that are finite in every run, since both want the same of each.
     """
     tasks: dict[str, dict[str, Any]] = {}
+    every = [results for found in plays.values() for results in found.results]
+    names = [name for name in next(iter(every), ()) if all(np.isfinite(results[name]).all() for results in every)]
     for (scenario, policy), found in plays.items():
-        tasks.setdefault(scenario, {})[policy] = {f"seed_{k}": _run(results) for k, results in enumerate(found.results)}
-    text = json.dumps({"posse": tasks}, indent=2, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+        runs = {f"seed_{k}": _run(results, names) for k, results in enumerate(found.results)}
+        tasks.setdefault(scenario, {})[policy] = runs
+    path.write_text(json.dumps({"posse": tasks}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _run(results: Results) -> dict[str, Any]:
-    metrics = {name: column.tolist() for name, column in results.columns.items() if np.isfinite(column).all()}
+def _run(results: Results, names: Sequence[str]) -> dict[str, Any]:
+    metrics = {name: results[name].tolist() for name in names}
     return {"step_0": {"step_count": 0, **metrics}, "absolute_metrics": metrics}
