@@ -64,8 +64,6 @@ def check_settings(settings: Any) -> None:
 
 def describe(error: BaseException) -> str:
     """Return an error in one line: its message, and where in the policy's code it was raised."""
-    if isinstance(error, PlayError):
-        return str(error)
     found = [importlib.util.find_spec(name) for name in ("posse", "posse_baselines", "posse_training")]
     ours = tuple(f"{Path(spec.origin).parent}{os.sep}" for spec in found if spec is not None and spec.origin)
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
