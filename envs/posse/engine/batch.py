@@ -214,9 +214,8 @@ class Batch(OwnArrays):
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.arrays.world, into.scenario, self.num_worlds * count)
         for mine, theirs in zip(self.arrays, into.arrays, strict=True):
-            if mine.size:  # as plain bytes, which are copied fastest
-                by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
-                theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
+            by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)  # plain bytes, which are copied fastest
+            theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
         draw_anew(self._fixed.config, into.arrays.world, into.arrays.tracker, count, seed, alike)
         into._started, into._over = True, count * self._over
         return into
