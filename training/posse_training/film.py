@@ -233,8 +233,7 @@ def _gif(frames: Iterator[Image.Image], frame_time: float) -> bytes:
         nearest = (apart**2).sum(axis=-1).argmin(axis=-1).astype(np.uint8)
         images.append(Image.fromarray(nearest[at].reshape(frame.height, frame.width)))
         images[-1].putpalette(table.astype(np.uint8).tobytes())
-    # In 1/1000 s; a GIF counts in 1/100 s, and players slow down frames of less than 2/100 s.
-    shown_for = max(2, round(frame_time * 100)) * 10
+    shown_for = round(frame_time * 100) * 10  # 1/1000 s; a GIF counts in 1/100 s
     times = [*[shown_for] * (len(images) - 1), max(shown_for, 1500)]  # the last one longer, before it repeats
     file = io.BytesIO()
     images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=times, loop=0)
