@@ -68,5 +68,6 @@ def describe(error: BaseException) -> str:
     ours = tuple(f"{Path(spec.origin).parent}{os.sep}" for spec in found if spec is not None and spec.origin)
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
     where = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
-    told = traceback.format_exception_only(error)[-isinstance(error, SyntaxError)]  # also where its text fails
+    # Not str(error), which may fail; of a SyntaxError the last line is its message.
+    told = traceback.format_exception_only(error)[-1 if isinstance(error, SyntaxError) else 0]
     return f"{type(error).__name__}: {' '.join(told.partition(': ')[2].split()):.300}{where}"

@@ -39,7 +39,7 @@ def find_occupied(c: Record, w: Record, trackers: Records, slots: Records, s: Re
         if t.slot < 0 and s.slot[i] >= ZERO:
             t.slot_distance = s.slot_distance[i]
         t.slot_progress -= t.slot_distance
-    w.score = min(ONE, np.float32(occupied) / np.float32(w.working))  # not all break
+    w.score = min(ONE, np.float32(occupied) / np.float32(w.working))  # at least one works
     w.held = w.held + 1 if occupied >= w.working else 0
 
 

@@ -121,8 +121,9 @@ def _what_next(path: Path) -> str:
         watched, teams, target = opponents[0], " ".join(opponents), f" --target {policy}"
     elif opponents:
         target = f" --target {opponents[-1]}"
-    settings = {**run.overrides, **dict(zip(("num_trackers",), run.team_sizes, strict=False))}
-    changed = f" --set {shlex.join(words_of(settings))}" if settings else ""
+    size = {"num_trackers": run.team_sizes[0]} if run.team_sizes else {}
+    settings = words_of({**run.overrides, **size})
+    changed = f" --set {shlex.join(settings)}" if settings else ""
     where = f"--scenario {scenario}{target}{changed}{''.join(f' --import {module}' for module in users_modules())}"
     lines = [f"watch {watched} {where}", f"compare {teams} {where}", f"replay {teams} {where} --out {page}"]
     shown = lines[1:2] if scenario in family_names() else lines  # watch and replay show one scenario
