@@ -1,6 +1,6 @@
 """How the return of a training and the safe score go together, over test worlds: python benchmarks/returns.py."""
 
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -13,12 +13,12 @@ CONTACTS = ("world_contacts_tracker", "world_contacts_obstacle", "world_contacts
 
 
 def correlations(
-    policy_name: str, scenario: str, weights: dict[str, float] | None, worlds: int = 300
+    policy_name: str, scenario: str, weights: Mapping[str, float], worlds: int = 300
 ) -> tuple[float, float]:
     """Return the correlations of the return with the safe score: until the first contact, and of the whole episode."""
     policy = load(policy_name)
-    weighted: dict[str, Any] = {} if weights is None else {"reward_weights": weights}
-    batch = posse.batch(scenario, worlds, seed=3, split="test", message_size=policy.message_size, **weighted)
+    weighted = posse.get_scenario(scenario, message_size=policy.message_size, reward_weights=weights)
+    batch = posse.batch(weighted, worlds, seed=3, split="test")
     played = rollout(batch, policy, ["rewards", *CONTACTS])
     rewards = played["rewards"][..., : batch.scenario.num_trackers].mean(axis=-1)
     before = np.stack([played[name] for name in CONTACTS]).sum(axis=0)[:-1] == 0
@@ -31,7 +31,8 @@ if __name__ == "__main__":
     print("| team | scenario | weights | return until the first contact | of the episode |\n|---|---|---|---|---|")
     for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field", "duel", "robots"):
         shipped = [each for each in policy_names() if each in (f"learned-{scenario}", f"corrected-{scenario}")]
-        for whose, weights in (("scenario", None), ("training", default_settings(scenario).reward_weights)):
+        own, trained = dict(posse.get_scenario(scenario).reward_weights), default_settings(scenario).reward_weights
+        for whose, weights in (("scenario", own), ("training", trained)):
             for name in ("ddcs-tuned", *shipped):
                 until, whole = correlations(name, scenario, weights)
                 print(f"| `{name}` | `{scenario}` | {whose} | {until:.2f} | {whole:.2f} |", flush=True)
