@@ -21,7 +21,6 @@ FOOTER: Final = 30  # points, height of the line below it
 _TITLE, _TEXT, _SMALL, _EDGE = 21, 17, 14, 14  # points: sizes of text, and a margin
 _BAR_LENGTHS: Final = (0.5, 1, 2, 5, 10, 20, 50, 100)  # m
 _BAR_MOST: Final = 110  # points
-_FAR: Final = 1000.0  # m; drawn range of a sensor without limit
 
 
 @dataclass(frozen=True)
@@ -56,30 +55,31 @@ def sensing(d: Drawing) -> None:
     s = d.scene.scenario
     if math.isinf(s.sensing_range) and s.field_of_view >= 2 * math.pi - 1e-9:
         return
-    areas = [d.camera.project(area_in_sight(d.scene, i)) for i in np.flatnonzero(d.scene.senses).tolist()]
+    areas = [d.camera.project(area_in_sight(d, i)) for i in np.flatnonzero(d.scene.senses).tolist()]
     for area in areas:  # every fill hides the outlines inside it
         d.canvas.polygon(area, style.SENSING_RIM, 2 * d.point)
     for area in areas:
         d.canvas.polygon(area, style.SENSING)
 
 
-def area_in_sight(scene: Scene, tracker: int) -> Points:
+def area_in_sight(d: Drawing, tracker: int) -> Points:
     """Return the corners (K, 2) m of the area that a tracker's sensor covers, a ray for each degree.
 
-    What lies behind an obstacle is not in sight.
+    It ends at the edge of the floor, and what lies behind an obstacle is not in sight.
     """
-    s, position, heading = scene.scenario, scene.position[tracker], scene.heading[tracker]
+    s, position, heading = d.scene.scenario, d.scene.position[tracker], d.scene.heading[tracker]
     half = min(s.field_of_view / 2, math.pi)
     angles = math.atan2(heading[1], heading[0]) + np.linspace(-half, half, math.ceil(360 * half / math.pi) + 2)
     ray = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    reach = np.full(len(ray), min(s.sensing_range, _FAR))
-    for x, y, radius in scene.obstacles:
+    low, high = d.camera.floor()
+    edges = np.where(ray > 0, high - position, position - low) / np.maximum(np.abs(ray), 1e-9)
+    reach = np.minimum(s.sensing_range, edges.min(axis=1))
+    for x, y, radius in d.scene.obstacles:
         towards = np.array([x, y]) - position
         along, across = ray @ towards, ray[:, 0] * towards[1] - ray[:, 1] * towards[0]
         entry = along - np.sqrt(np.maximum(radius**2 - across**2, 0))
         reach = np.where((entry > 0) & (np.abs(across) < radius), np.minimum(reach, entry), reach)
-    corner = np.array(s.half_sides)
-    rim = np.clip(position + reach[:, None] * ray, -corner, corner)
+    rim = position + reach[:, None] * ray
     return rim if half == math.pi else np.concatenate([position[None], rim])
 
 

@@ -69,6 +69,15 @@ def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
     assert_colour(renderer, frame, (3.2, 0.2), GROUND)
 
 
+def test_sight_without_limit_is_drawn_like_one_beyond_the_view() -> None:
+    frames = []
+    for sensing_range in (np.inf, 50.0):
+        batch = posse.batch("constant", 1, field_of_view=1.0, sensing_range=sensing_range)
+        batch.reset()
+        frames.append(frame_of(Renderer(batch.scenario, size=SIZE), batch))
+    np.testing.assert_array_equal(*frames)
+
+
 def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
     code = (
         "import sys, posse; print('pygame' in sys.modules);"
