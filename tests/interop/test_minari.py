@@ -14,7 +14,7 @@ import posse
 from posse_training import datasets
 from posse_training.cli import main
 from posse_training.datasets import record_dataset
-from posse_training.errors import SettingsError
+from posse_training.errors import RunFolderError, SettingsError
 
 SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}
 
@@ -61,6 +61,17 @@ def test_a_recording_that_is_killed_leaves_no_data_set_and_a_whole_one_is_not_ov
     assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
     with pytest.raises(SettingsError, match="exists: remove it"):
         record_dataset("idle", "constant", 1, out=tmp_path, **SHORT)
+
+
+def test_two_recordings_of_one_name_do_not_lose_the_second_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def again(*_: Any) -> None:
+        record_dataset("random", "constant", 1, out=tmp_path, name="one", **SHORT)
+
+    monkeypatch.setattr(datasets, "_episode", again)
+    with pytest.raises(RunFolderError, match="uses .*: wait, stop it, or choose another"):
+        record_dataset("idle", "constant", 1, out=tmp_path, name="one", **SHORT)
 
 
 def test_the_command_says_how_to_load(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shlex
-import tempfile
+import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
 from posse_training.evaluation.evaluation import played_errors, progress_bar
+from posse_training.files import locked
 from posse_training.options import Worlds
 from posse_training.provenance import commit
 
@@ -65,6 +67,7 @@ def record_dataset(
     Raises:
         MissingExtraError: Minari is not installed.
         SettingsError: Too few episodes, or a data set of this name in ``out``.
+        RunFolderError: Another process records one of this name there.
         PolicyError: No policy, an unknown one, or one that does not fit the scenario.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
     """
@@ -104,12 +107,11 @@ def record_dataset(
         "minari_version": minari.__version__,
         "posse": json.dumps(about),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    with (
-        tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial,
-        progress_bar(disable=not progress) as bar,
-    ):
-        (data := Path(partial, "new", "data")).mkdir(parents=True)
+    partial = folder / f".recording-{called.replace('/', '-')}"
+    with locked(partial), progress_bar(disable=not progress) as bar, contextlib.ExitStack() as stack:
+        stack.callback(shutil.rmtree, partial)
+        shutil.rmtree(partial / "new", ignore_errors=True)  # of a recording that was killed
+        (data := partial / "new" / "data").mkdir(parents=True)
         storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
         storage.update_metadata(described)
         for world in bar.track(range(episodes), description="episodes"):

@@ -75,7 +75,7 @@ def test_sight_without_limit_is_drawn_like_one_beyond_the_view() -> None:
         batch = posse.batch("constant", 1, field_of_view=1.0, sensing_range=sensing_range)
         batch.reset()
         frames.append(frame_of(Renderer(batch.scenario, size=SIZE), batch))
-    np.testing.assert_array_equal(*frames)
+    np.testing.assert_array_equal(frames[0], frames[1])
 
 
 def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
