@@ -70,7 +70,7 @@ def test_two_recordings_of_one_name_do_not_lose_the_second_at_its_end(
         record_dataset("random", "constant", 1, out=tmp_path, name="one", **SHORT)
 
     monkeypatch.setattr(datasets, "_episode", again)
-    with pytest.raises(RunFolderError, match="uses .*: wait, stop it, or choose another"):
+    with pytest.raises(RunFolderError, match=r"uses .*: wait, stop it, or choose another"):
         record_dataset("idle", "constant", 1, out=tmp_path, name="one", **SHORT)
 
 

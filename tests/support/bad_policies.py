@@ -3,6 +3,7 @@
 import ctypes
 import os
 import signal
+import threading
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -50,6 +51,12 @@ class Hangs(Idle):
         Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
         ctypes.PyDLL(None).sleep(600)
         raise AssertionError
+
+
+class LeavesThread(Idle):
+    def begin(self, layout: Any, num_worlds: int) -> Any:
+        threading.Thread(target=time.sleep, args=(600.0,)).start()
+        return super().begin(layout, num_worlds)
 
 
 class Crashes(Idle):

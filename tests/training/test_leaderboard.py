@@ -40,6 +40,8 @@ def test_a_claim_is_what_an_evaluation_measures_and_holds_on_fresh_worlds(claim:
 
 def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Standing, tmp_path: Path) -> None:
     folder = sent(tmp_path, claim, **{name: getattr(claim, name) + 0.1 for name in ("safe_score", "low", "high")})
+    with pytest.raises(SettingsError, match="the claim's own worlds"):
+        verify(folder, seed=claim.seed)
     raised, measured = verify(folder, episodes=WORLDS, seed=3)
     assert not raised.agrees(measured)
     assert not replace(measured, reads_state=True).agrees(measured)

@@ -192,8 +192,8 @@ def verify(
         seed: Seed of the fresh worlds; default: drawn now, so that no submission can know them.
 
     Raises:
-        SettingsError: An invalid claim, or one of another seed than 2026; code without ``run_code``, or another version
-            of the scenario.
+        SettingsError: An invalid claim, or one of another seed than 2026, or ``seed`` is that; code without
+            ``run_code``, or another version of the scenario.
         PlayError: An error of the policy's own code.
     """
     rows = read_standings(path := folder / CLAIM)
@@ -204,6 +204,8 @@ def verify(
         raise SettingsError(f"{path}: seed={claim.seed}, and claims are of seed {SEED}")
     if claim.scenario not in scenario_names() or get_scenario(claim.scenario).version != claim.version:
         raise SettingsError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
+    if seed == SEED:
+        raise SettingsError(f"seed={SEED} gives the claim's own worlds: choose another seed, or none")
     if is_code(text) and not run_code:
         raise SettingsError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
     policy = load(str(folder / text) if Path(text).suffix in FILES else text)

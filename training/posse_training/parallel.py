@@ -87,6 +87,8 @@ def _answer() -> None:
         # A hanging policy does not outlive a parent that was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         found.write(cloudpickle.dumps(_work(*call)))
+        found.flush()
+        os._exit(0)  # threads that a policy leaves behind end, too
 
 
 # --- a Ray cluster --------------------------------------------------------------------------------

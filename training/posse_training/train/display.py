@@ -46,7 +46,7 @@ class Display:
         if steps >= total:
             self.note(f"{steps:,} steps are made already: none is added")
         elif total != self._settings.steps:
-            self.note(f"trains for {total:,} steps, which are whole rollouts")
+            self.note(f"trains for {total:,} steps, which are whole rounds of its algorithm")
         self._started, self._from_steps = time.monotonic(), steps
         self.bar.reset(self._task, total=total, completed=steps)
 

@@ -127,7 +127,7 @@ class TrainSettings:
 
     # sac and td3
     replay: int = number(400_000, "", 1, 10**9)
-    """Steps in the replay buffer."""
+    """Steps in the replay buffer, rounded to whole steps of all worlds."""
     learning_starts: int = number(20_000, "", 0, 10**12)
     """Steps of random actions before learning starts."""
     gradients: int = number(4, "", 1, 10**4)
