@@ -93,12 +93,12 @@ class Recorder:
 
         recorder = Recorder(batch, ["tracker_pose", "actions"])
         observations = recorder.reset()
-        while not recorder.over.all():
+        while recorder.going:
             observations, *_ = recorder.step(actions)
         recorder.trajectory()
 
     Attributes:
-        over: (E,) whether the first episode of each world has ended.
+        going: Number of worlds whose first episode has not ended.
         steps: Number of recorded steps; -1 before the first reset.
 
     Raises:
@@ -120,15 +120,15 @@ class Recorder:
         groups = {"state": state, "terms": ("reward",), "annotations": ("annotation",)}
         self._names = dict.fromkeys(each for name in names for each in groups.get(name, (name,)))
         self._reads_state = not self._names.keys().isdisjoint((*_POSES, *state))
-        self.over, self.steps = np.zeros(batch.num_worlds, np.bool_), -1
+        self.going, self.steps = batch.num_worlds, -1
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
         if isinstance(options, Mapping) and options.get("reset_mask") is not None:
             raise ValueError("reset_mask leaves episodes running, of which the beginning is not recorded: leave it out")
         observations = self.batch.reset(seed=seed, options=options)
-        self.over = np.zeros(self.batch.num_worlds, np.bool_)
-        self.steps = 0
+        self.going, self.steps = self.batch.num_worlds, 0
+        self._over = np.zeros(self.batch.num_worlds, np.bool_)
         self._lengths = np.zeros(self.batch.num_worlds, np.int64)
         self._rows: dict[str, list[Array]] = defaultdict(list)
         self._metrics: dict[str, npt.NDArray[np.float64]] = {}
@@ -145,12 +145,13 @@ class Recorder:
         self.steps += 1
         ended = terminated | truncated
         if ended.any():
-            first = ended & ~self.over
+            first = ended & ~self._over
             for name in self.batch.metrics():
                 column = self._metrics.setdefault(name, np.full(len(first), np.nan))
                 column[first] = infos[f"metrics/{name}"][first]
             self._lengths[first] = self.steps
-            self.over |= first
+            self._over |= first
+            self.going -= int(first.sum())
         if not self._names:
             return done
         terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
@@ -194,9 +195,9 @@ class Recorder:
         self._check_reset()
         now = {name: np.array(values, np.float64) for name, values in self.batch.metrics().items()}
         for name, values in self._metrics.items():
-            now[name][self.over] = values[self.over]
+            now[name][self._over] = values[self._over]
         arrays = {name: np.stack(rows) for name, rows in self._rows.items()}
-        lengths = np.where(self.over, self._lengths, self.steps)
+        lengths = np.where(self._over, self._lengths, self.steps)
         return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, lengths, now)
 
 
@@ -266,18 +267,18 @@ def rollout(
     recorder = Recorder(_moving(batch), record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)
-    while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
+    while recorder.steps != steps and (recorder.going or (steps is not None and batch.autoreset != "disabled")):
         actions, memory = policy.act(observations, memory)
         annotations = policy.annotations(memory) if "annotations" in record else None
-        observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
-        ended = terminated | truncated
-        begins = batch.arrays.world["step"] == 0
-        if begins.any():
-            memory = policy.restart(memory, begins)
+        observations, *_ = recorder.step(actions, annotations)
+        if recorder.going < batch.num_worlds:  # an episode has ended
+            if batch.autoreset == "disabled" and recorder.going:
+                raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
+            begins = batch.arrays.world["step"] == 0
+            if begins.any():
+                memory = policy.restart(memory, begins)
         if after_step is not None:
             after_step(memory)
-        if batch.autoreset == "disabled" and ended.any() and not ended.all():
-            raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
     return recorder.trajectory()
 
 

@@ -110,7 +110,7 @@ def play(
                 scores = _play_round(policy, recorder, robot, renderer, window)
             if scores:
                 last = replay_of(recorder.trajectory(), f"{policy.name}, {who}")
-            if recorder.over.all():
+            if not recorder.going:
                 rounds.append(_points(scores, robot == n))
             if "n" in window.pressed:
                 world += 1
@@ -129,7 +129,7 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
     speed = 1.0
     scores: list[float] = []
     renderer.draw(batch, colours=colours)
-    while renderer.window and not (recorder.over.all() or "n" in window.pressed):
+    while renderer.window and recorder.going and "n" not in window.pressed:
         held = window.held(*_ARROWS)
         change = ("up" in held) - ("down" in held)
         speed = min(max(speed + change * _CHANGE * scenario.control_step, -1.0), 1.0)  # stays when no key is held
@@ -141,7 +141,7 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
         scores.append(float(infos["score"][0]))
         left = scenario.duration - len(scores) * scenario.control_step
         renderer.title = f"{title}: {_points(scores, robot == n):.0f} points, {left:.0f} s left"
-        window.paused |= bool(recorder.over.all())  # until the user goes on: another round in the same world
+        window.paused |= not recorder.going  # until the user goes on: another round in the same world
         renderer.draw(batch, colours=colours)
     return scores
 
