@@ -258,7 +258,6 @@ class Minds(OwnArrays):
                 layout.views(self._units)[field.name][...] = unit
         self.me: Records = np.full((num_worlds, robots), MIND)
         self.mates: Records = np.full((num_worlds, robots, layout.scenario.num_trackers), MATE)
-        self._work = work_for(layout.scenario.num_trackers)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget all in the worlds of a mask (E,), whose episodes restart."""
@@ -269,9 +268,8 @@ class Minds(OwnArrays):
         rows = check_observations(observations, self.me.shape, self.layout)
         if unit_of(self.layout.scenario) != 1.0:
             rows = rows / self._units
-        arguments, (worlds, robots) = ((self.team, self.me, self.mates), self._work, (rows, out), part), self.me.shape
-        # An unpickled memory may have work arrays for fewer threads than this machine runs.
-        over_worlds(kernel, arguments, worlds, robots, len(self._work.cost))
+        minds, works = (self.team, self.me, self.mates), work_for(self.layout.scenario.num_trackers)
+        over_worlds(kernel, (minds, works, (rows, out), part), *self.me.shape)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""

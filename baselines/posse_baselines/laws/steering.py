@@ -37,7 +37,7 @@ class Work(NamedTuple):
 
 
 def work_for(num_trackers: int) -> Work:
-    """Return the arrays of all threads of this machine; a call of a kernel says for how many they are."""
+    """Return the arrays of all threads of this machine, for one call of a kernel."""
     n, threads = num_trackers, MOST_THREADS
     cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
     return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC))

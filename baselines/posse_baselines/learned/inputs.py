@@ -139,14 +139,12 @@ class Encoder(OwnArrays):
         self.estimates["age"] = -1.0
         self._columns, self._unknown = encoding.columns(layout)
         slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
-        # What features are computed in, one of each for a thread.
-        work = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(slots))
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
         noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
         share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(patience_of(layout.scenario))
         half, slowest = complex(*layout.scenario.half_sides), np.float32(min(layout.scenario.tracker_speeds))
-        self._for_features = Known(offsets_of(layout), slots, slowest, half, first, share, patience), *work
+        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, patience)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""
@@ -167,9 +165,9 @@ class Encoder(OwnArrays):
             out = np.empty((len(rows), self.encoding.size), np.float32)
         if (count := self.encoding.num_features) > 0:
             features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
+            works = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(self._known.slots))
             # The threads share out rows as if each were a world of one tracker.
-            arguments, threads = (rows, self._for_features, estimates.reshape(-1), features), len(self._for_features[1])
-            over_worlds(_write_all, arguments, len(rows), 1, threads)
+            over_worlds(_write_all, (rows, self._known, estimates.reshape(-1), features, works), len(rows), 1)
             self.estimates[worlds] = estimates
             out[:, :count] = features.view(np.float32).reshape(len(rows), count)
         read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
@@ -180,9 +178,8 @@ class Encoder(OwnArrays):
 
 @kernel
 def _write_all(
-    rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
+    rows: FloatArray, known: Known, estimates: Records, features: Records, works: Any, thread: int, first: int, end: int
 ) -> None:
-    known, places, works = given
-    work = work_of(works, thread)
+    places, work = works[0][thread], work_of(works[1], thread)
     for r in range(first, end):
-        write_features(rows[r], known, estimates[r], places[thread], work, features[r])
+        write_features(rows[r], known, estimates[r], places, work, features[r])

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse.rules import config_record, slot_records
-from posse_baselines.laws.steering import work_for
 from posse_baselines.policies.planner_law import PLAN, WAY, Teams, drive
 from posse_baselines.policy import BasePolicy, Memory, PolicyError
 
@@ -56,7 +55,6 @@ class Search(OwnArrays):
             ways=np.full(shape, _STANDARD[0]),
             plans=np.full(shape, PLAN),
             late=np.zeros(n, np.float32),
-            work=work_for(n),
         )
         self._copies: Batch | None = None
         self._later: Batch | None = None

@@ -17,7 +17,7 @@ from posse_baselines.ddcs.memory import record
 from posse_baselines.laws.geometry import angle_of, length, wrap
 from posse_baselines.laws.guidance import BODY, UNLIMITED, regulate, write_motion
 from posse_baselines.laws.safeguard import put_disc, put_walls, safe_velocity
-from posse_baselines.laws.steering import Work, approach_velocity, assign, slot_velocity, way_round, work_of
+from posse_baselines.laws.steering import Work, approach_velocity, assign, slot_velocity, way_round, work_for, work_of
 
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
 _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
@@ -52,13 +52,12 @@ class Teams(NamedTuple):
     """(E, N) :data:`PLAN`, brought up to date by :func:`drive`."""
     late: FloatArray
     """(N,) s; by how much a slot is taken to be reached later than it is, so that others are filled before it."""
-    work: Work
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
     """Write actions (E, rows, 2 + m) for the trackers of those worlds that are ``going`` (E,)."""
-    threads, robots = len(teams.work.cost), batch.scenario.num_trackers
-    over_worlds(drive_all, (teams, batch.arrays, going, actions), batch.num_worlds, robots, threads)
+    robots = batch.scenario.num_trackers
+    over_worlds(drive_all, (teams, work_for(robots), batch.arrays, going, actions), batch.num_worlds, robots)
 
 
 @compiled
@@ -157,10 +156,10 @@ def drive_team(teams: Teams, worlds: Any, e: int, work: Work, actions: FloatArra
 
 @kernel
 def drive_all(
-    teams: Teams, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
+    teams: Teams, works: Work, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
-    work = work_of(teams.work, thread)
+    work = work_of(works, thread)
     for e in range(first, end):
         if going[e]:
             drive_team(teams, worlds, e, work, actions[e])
