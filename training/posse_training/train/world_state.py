@@ -10,46 +10,14 @@ from typing import Any, Final
 import numpy as np
 
 from posse import Batch, Scenario
-from posse.numeric import ONE, ZERO, FloatArray, Records, kernel
-from posse.rules import NEVER, config_record, in_frame
+from posse.numeric import FloatArray
+from posse.rules import NEVER
 
 TARGET_SIZE: Final = 6
 TRACKER_SIZE: Final = 11
 OBSTACLE_SIZE: Final = 3
-
-
-@kernel
-def _write(config: Records, world: Records, tracker: Records, obstacle: Records, places: int, out: FloatArray) -> None:
-    c = config[0]
-    n = c.num_trackers
-    for e in range(len(world)):
-        w = world[e]
-        for i in range(n):
-            o = out[e * n + i]
-            for k in range(len(o)):
-                o[k] = ZERO
-            o[0] = w.speed
-            o[1] = w.turn_rate
-            o[2], o[3] = in_frame(w.heading_cos, w.heading_sin, w.frame_cos, w.frame_sin)
-            o[4] = w.score
-            o[5] = np.float32(c.horizon - w.step) * c.control_step
-            for j in range(n):
-                t = tracker[e, (i + j) % n]
-                k = TARGET_SIZE + j * TRACKER_SIZE
-                o[k], o[k + 1] = in_frame(t.x - w.x, t.y - w.y, w.frame_cos, w.frame_sin)
-                o[k + 2], o[k + 3] = in_frame(t.heading_cos, t.heading_sin, w.frame_cos, w.frame_sin)
-                o[k + 4] = t.speed
-                o[k + 5] = t.turn_rate
-                o[k + 6] = ONE if t.broken_at == NEVER else ZERO
-                o[k + 7] = ONE if t.slot >= 0 else ZERO
-                o[k + 8] = t.slot_distance
-                o[k + 9] = np.float32(t.sees)
-                o[k + 10] = np.float32(t.touching)
-            for m in range(c.num_obstacles):
-                k = TARGET_SIZE + places * TRACKER_SIZE + m * OBSTACLE_SIZE
-                disc = obstacle[e, m]
-                o[k], o[k + 1] = in_frame(disc.x - w.x, disc.y - w.y, w.frame_cos, w.frame_sin)
-                o[k + 2] = disc.radius
+_POSE: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
+_READ: Final = (*_POSE, "broken_at", "slot", "slot_distance", "sees", "touching")
 
 
 class StateWriter:
@@ -67,10 +35,8 @@ class StateWriter:
         if batch.action_shape[1] != batch.scenario.num_trackers:
             raise ValueError(f"see_state needs all trackers moved from outside, here {batch.action_shape[1]} are")
         self._batch = batch
-        self._config = config_record(batch.scenario)
-        self._places = max(scenario.num_trackers for scenario in scenarios)
-        obstacles = max(scenario.num_obstacles for scenario in scenarios)
-        self.size = TARGET_SIZE + self._places * TRACKER_SIZE + obstacles * OBSTACLE_SIZE
+        self._obstacles_at = TARGET_SIZE + TRACKER_SIZE * max(scenario.num_trackers for scenario in scenarios)
+        self.size = self._obstacles_at + OBSTACLE_SIZE * max(scenario.num_obstacles for scenario in scenarios)
         """Numbers in a state."""
 
     def write(self, out: FloatArray, worlds: Any = slice(None)) -> None:
@@ -78,6 +44,23 @@ class StateWriter:
 
         ``out`` is (trackers of these worlds, size).
         """
-        arrays = self._batch.arrays
-        world, tracker, obstacle = (a[worlds] for a in (arrays.world, arrays.tracker, arrays.obstacle))
-        _write(self._config, world, tracker, obstacle, self._places, out)
+        s, arrays = self._batch.scenario, self._batch.arrays
+        w, tracker, disc = arrays.world[worlds][:, None, None], arrays.tracker[worlds], arrays.obstacle[worlds][:, None]
+        n, m, at = s.num_trackers, s.num_obstacles, self._obstacles_at
+        order = (np.arange(n)[:, None] + np.arange(n)) % n  # of each tracker, itself first
+        t = {name: tracker[name][:, order] for name in _READ}  # (E, N, N)
+
+        def in_frame(x: Any, y: Any) -> tuple[Any, Any]:
+            return x * w["frame_cos"] + y * w["frame_sin"], y * w["frame_cos"] - x * w["frame_sin"]
+
+        left = (s.horizon - w["step"]).astype(np.float32) * np.float32(s.control_step)  # s
+        target = w["speed"], w["turn_rate"], *in_frame(w["heading_cos"], w["heading_sin"]), w["score"], left
+        place, heading = in_frame(t["x"] - w["x"], t["y"] - w["y"]), in_frame(t["heading_cos"], t["heading_sin"])
+        flags = t["broken_at"] == NEVER, t["slot"] >= 0, t["slot_distance"], t["sees"], t["touching"]
+        trackers = *place, *heading, t["speed"], t["turn_rate"], *flags
+        obstacles = *in_frame(disc["x"] - w["x"], disc["y"] - w["y"]), disc["radius"]
+        out[:] = 0
+        each = out.reshape(len(w), n, self.size)
+        each[..., :TARGET_SIZE] = np.concatenate(target, axis=-1)
+        each[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(len(w), n, -1)
+        each[..., at : at + m * OBSTACLE_SIZE] = np.stack(obstacles, -1).reshape(len(w), 1, m * OBSTACLE_SIZE)
