@@ -86,7 +86,7 @@ def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
     settings = small(tmp_path, "cmaes", **changes, target="smart,evader")
     weights = np.zeros((3, 2, 17), np.float32)
     weights[1:] = np.random.default_rng(0).normal(0.0, 0.05, (2, 2, 17))
-    together = Candidates(settings, weights, {}).scores(5, None)
-    alone = [Candidates(settings, weights[k : k + 1], {}).scores(5, None)[0] for k in range(3)]
+    together = Candidates(settings, weights).scores(5, None)
+    alone = [Candidates(settings, weights[k : k + 1]).scores(5, None)[0] for k in range(3)]
     assert together == pytest.approx(alone, abs=0.02)
     assert np.ptp(alone) > 0.05

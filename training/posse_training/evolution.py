@@ -60,8 +60,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         display.note(f"resuming {folder} at generation {len(state['scores'])}")
     scores, curve, started = state["scores"], state["curve"], time.monotonic() - state["seconds"]
 
-    def team(points: list[npt.NDArray[np.float64]], card: dict[str, Any] | None = None) -> Candidates:
-        return Candidates(s, np.tensordot(np.array(points, np.float32), basis, 1), card or {})
+    def team(points: list[npt.NDArray[np.float64]]) -> Candidates:
+        return Candidates(s, np.tensordot(np.array(points, np.float32), basis, 1))
 
     def play(points: list[npt.NDArray[np.float64]]) -> list[float]:
         """Return the mean safe score of each candidate on the worlds of the present generation."""
@@ -69,13 +69,13 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     def evaluate(steps: int) -> None:
         """Score the mean of the search on the validation worlds; keep it if it is the best so far."""
-        point = {"steps": float(steps), "seconds": time.monotonic() - started}
-        point |= validate(s, team([cma.mean]))
+        found = team([cma.mean])
+        point = {"steps": float(steps), "seconds": time.monotonic() - started, **validate(s, found)}
         best = max((earlier["safe_score"] for earlier in curve), default=-1.0)
         curve.append(point)
         write_csv(folder / CURVE, curve)
         if point["safe_score"] > best:
-            team([cma.mean], make_card(s, steps=steps, curve=curve)).save(folder / BEST)
+            found.with_card(make_card(s, steps=steps, curve=curve)).save(folder / BEST)
         display.evaluated(point)
 
     cma = SepCMA(mean=np.zeros(len(basis)), sigma=s.deviation, seed=s.seed, population_size=s.population)
@@ -98,28 +98,28 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     if curve[-1]["steps"] < generations * each:  # also where a run is ended by fewer steps
         evaluate(generations * each)
         write_json(folder / STATE, state, indent=None)
-    team([cma.mean], make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
+    team([cma.mean]).with_card(make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
 
 
 def check_adviser(settings: TrainSettings) -> None:
     """Raise PolicyError if the script that a run corrects cannot be an adviser."""
-    Candidates(settings, np.zeros_like(_basis(settings)[:1]), {})
+    Candidates(settings, np.zeros_like(_basis(settings)[:1]))
 
 
 class Candidates(LearnedPolicy):
     """C policies or corrections, each of which plays its share of the worlds: the first one the first E / C, and so on.
 
-    Their weights are (C, MOTION, inputs); a file of this policy holds the first one, with the card.
+    Their weights are (C, MOTION, inputs); a file of this policy holds the first one.
     """
 
-    def __init__(self, settings: TrainSettings, weights: FloatArray, card: dict[str, Any]) -> None:
+    def __init__(self, settings: TrainSettings, weights: FloatArray) -> None:
         self._settings, self._weights = settings, weights
         zeros, ones = np.zeros(weights.shape[2], np.float32), np.ones(weights.shape[2], np.float32)
         network = Network(zeros, ones, (weights[0],), (zeros[:MOTION],), settings.activation, "clip")
         encoding = Encoding(settings.encoding, 0, ())
         adviser = None if settings.advise is None else load(settings.advise)
-        super().__init__(network, encoding, card, adviser, settings.safeguard)
+        super().__init__(network, encoding, {}, adviser, settings.safeguard)
 
     def _forward(self, inputs: FloatArray) -> FloatArray:
         if len(self._weights) == 1:
