@@ -1,21 +1,21 @@
 """``posse watch``: one world in a window, as a replay page, or as a film."""
 
-from __future__ import annotations
-
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import tyro
 
+from posse import Scenario, get_scenario
+from posse_baselines import Policy, load, load_target
 from posse_training.errors import SettingsError
+from posse_training.evaluation.episodes import refuse_two_targets
+from posse_training.film import Team, film
 from posse_training.options import Shown
-
-if TYPE_CHECKING:
-    from posse import Scenario
-    from posse_baselines import Policy
+from posse_training.play import open_window
+from posse_training.replay import record, write_replay
 
 _PAGE: Final = Path("runs/watch/replay.html")
 
@@ -56,12 +56,6 @@ def main(arguments: Sequence[str]) -> None:
     ):
         if value is not None and not is_used:
             raise SettingsError(f"{option} is not for a {'page' if which.page else 'window'}: leave it out")
-    size = which.size or (960, 720)
-
-    from posse import get_scenario
-    from posse_baselines import load, load_target
-    from posse_training.evaluation.episodes import refuse_two_targets
-
     scenario = get_scenario(which.scenario, **which.overrides)
     refuse_two_targets(which.target, which.overrides)
     target = None if which.target is None else load_target(which.target)
@@ -70,27 +64,20 @@ def main(arguments: Sequence[str]) -> None:
     policies = [load(name) for name in which.policies]
     world = {**which.place, "target": target}
     if which.out is not None:
-        from posse_training.film import film
-
         asked = {"start": which.start, "seconds": which.seconds, "speed": which.speed, "size": which.size}
         how: Any = {"seconds": scenario.duration} | {name: value for name, value in asked.items() if value is not None}
         print(film([(p.name, p) for p in policies], scenario, path=which.out, **how, **world))
     elif which.page:
-        from posse_training.replay import record, write_replay
-
         _PAGE.parent.mkdir(parents=True, exist_ok=True)
         path = write_replay(record(policies, scenario, seconds=which.seconds, **world), _PAGE)
         print(f"{path}: open it in a browser")
         webbrowser.open(path.resolve().as_uri())
     else:
-        watch(policies, scenario, size, **world)
+        watch(policies, scenario, which.size or (960, 720), **world)
 
 
 def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int], world: int, **worlds: Any) -> None:
     """Play one policy at a time in a window, until the user closes it; each ended episode prints its score."""
-    from posse_training.film import Team
-    from posse_training.play import open_window
-
     shown, keys = 0, {"n": "next world"} | ({"p": "next policy"} if len(policies) > 1 else {})
     longest = max(scenario.message_size, *(policy.message_size for policy in policies))
     scenario = scenario.replace(message_size=longest)  # a window shows batches of one scenario
