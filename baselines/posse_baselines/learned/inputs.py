@@ -154,26 +154,23 @@ class Encoder(OwnArrays):
         """Return what is remembered as arrays (E, R) by name; views, not copies."""
         return {f"target_{name}": self.estimates[name] for name in ESTIMATE.names or ()}
 
-    def encode(self, observations: FloatArray, out: FloatArray | None = None, worlds: Any = ...) -> FloatArray:
-        """Return observations (worlds, R, F) of all worlds, or of those, as (rows, size), written to ``out`` if given.
+    def encode(self, observations: FloatArray, worlds: Any = ...) -> FloatArray:
+        """Return observations (worlds, R, F) of all worlds, or of those, as (rows, size).
 
         Call it once a control step. PolicyError if the observations have another shape.
         """
         robots = self.estimates[worlds].shape
         rows = check_observations(observations, robots, self.layout).reshape(-1, self.layout.size)
-        if out is None:
-            out = np.empty((len(rows), self.encoding.size), np.float32)
-        if (count := self.encoding.num_features) > 0:
-            features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
-            works = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(self._known.slots))
-            # The threads share out rows as if each were a world of one tracker.
-            over_worlds(_write_all, (rows, self._known, estimates.reshape(-1), features, works), len(rows), 1)
-            self.estimates[worlds] = estimates
-            out[:, :count] = features.view(np.float32).reshape(len(rows), count)
-        read, missing = out[:, out.shape[1] - len(self._columns) :], self._columns < 0
-        read[...] = np.take(rows, self._columns, axis=1, mode="wrap")
+        read, missing = np.take(rows, self._columns, axis=1, mode="wrap"), self._columns < 0
         read[:, missing] = self._unknown[missing]
-        return out
+        if self.encoding.num_features == 0:
+            return read
+        features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
+        works = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(self._known.slots))
+        # The threads share out rows as if each were a world of one tracker.
+        over_worlds(_write_all, (rows, self._known, estimates.reshape(-1), features, works), len(rows), 1)
+        self.estimates[worlds] = estimates
+        return np.hstack([features.view(np.float32).reshape(len(rows), -1), read])
 
 
 @kernel

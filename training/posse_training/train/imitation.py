@@ -24,7 +24,6 @@ from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import SlotGroup
-from posse_training.train.world_state import StateWriter
 from posse_training.train.worlds import pairings
 
 WORLDS: Final = 64
@@ -75,7 +74,8 @@ def imitate(
     drawn, pairs = settings.family_scenarios, pairings(settings)
     parts = [(shares(pair.scenario, drawn, drawn, settings.seed, "train"), pair.opponent) for pair in pairs]
     plays: list[tuple[Scenario, Any]] = [(scenario, target) for part, target in parts for scenario, _ in part]
-    worlds, reads_state = max(1, WORLDS // len(plays)), ALGORITHMS[settings.algorithm].reads_state
+    worlds = max(1, WORLDS // len(plays))
+    seen = [scenario for scenario, _ in plays] if ALGORITHMS[settings.algorithm].reads_state else []
     first_world = FIRST_WORLD
     rounds = settings.imitate_rounds
     every: list[Rows] = []
@@ -84,8 +84,7 @@ def imitate(
         for scenario, target in plays:
             by_expert = generator.random(worlds) < 1.0 - k / max(1, rounds - 1)
             batch = batch_for(expert, scenario, worlds, target, seed=settings.seed, first_world=first_world)
-            state = StateWriter(batch, [one for one, _ in plays]) if reads_state else None
-            slots = SlotGroup(batch, encoding, state, settings.safeguard)
+            slots = SlotGroup(batch, encoding, seen, settings.safeguard)
             played.append(_play_round(policy, settings, slots, expert, batch, by_expert))
             first_world += worlds
         every += played

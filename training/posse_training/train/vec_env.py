@@ -15,12 +15,12 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
-from posse import Batch, PairedBatch, Snapshot
+from posse import Batch, PairedBatch, Scenario, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.safeguard import Guard
-from posse_training.train.world_state import StateWriter
+from posse_training.train.world_state import StateReader
 
 _NEVER: Final = -1
 
@@ -58,11 +58,8 @@ class TeamVecEnv(VecEnv):
     ) -> None:
         self.batches, self.encoding = tuple(batches), encoding
         self.action_length = _action_length(batches)
-        scenarios = [batch.scenario for batch in batches]
-        states = [StateWriter(batch, scenarios) if see_state else None for batch in batches]
-        self._groups = [
-            SlotGroup(batch, encoding, state, safeguard) for batch, state in zip(batches, states, strict=True)
-        ]
+        seen = [batch.scenario for batch in batches] if see_state else []
+        self._groups = [SlotGroup(batch, encoding, seen, safeguard) for batch in batches]
         self._owners = [batch for batch in batches for _ in range(batch.num_worlds * batch.action_shape[1])]
         self.size = self._groups[0].size
         self._terms: dict[str, list[float]] = {}  # sum over slots and steps, and of how many
@@ -174,17 +171,20 @@ def _action_length(batches: Sequence[Batch]) -> int:
 
 
 class SlotGroup:
-    """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e."""
+    """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e.
 
-    def __init__(self, batch: Batch, encoding: Encoding, state: StateWriter | None, safeguard: bool = False) -> None:
+    The state of the world is appended if ``seen`` has the scenarios of all groups (:class:`StateReader`).
+    """
+
+    def __init__(self, batch: Batch, encoding: Encoding, seen: Sequence[Scenario], safeguard: bool) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         if safeguard and trackers != batch.scenario.num_trackers:
             raise PolicyError("safeguard=True is for trackers, not for a target moved from outside: leave it out")
         self.num_slots = worlds * trackers
-        self.size = encoding.size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
-        self._state = state
+        self._state = StateReader(batch, seen) if seen else None
+        self.size = encoding.size + (self._state.size if self._state else 0)
         # What makes the robots' actions of the model's, and the observations that it reads.
         self.guard = Guard(batch.layout, worlds) if safeguard else None
         self._seen = np.zeros(batch.observation_shape, np.float32)
@@ -235,13 +235,8 @@ class SlotGroup:
 
     def encode(self, raw: FloatArray, worlds: Any = ...) -> FloatArray:
         """Return the observations (slots, size) of all slots, or of those of some worlds; call it once a step."""
-        seen = raw[worlds]
-        out = np.empty((seen.shape[0] * seen.shape[1], self.size), np.float32)
-        own = self._encoder.encoding.size
-        self._encoder.encode(seen, out[:, :own], worlds)
-        if self._state is not None:
-            self._state.write(out[:, own:], worlds)
-        return out
+        rows = self._encoder.encode(raw[worlds], worlds)
+        return rows if self._state is None else np.hstack([rows, self._state.read(worlds)])
 
     def _report(
         self, raw: FloatArray, ended: BoolArray, terminated: BoolArray, over: BoolArray, infos: list[dict[str, Any]]

@@ -20,8 +20,8 @@ _POSE: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
 _READ: Final = (*_POSE, "broken_at", "slot", "slot_distance", "sees", "touching")
 
 
-class StateWriter:
-    """Writes the state of a batch's worlds, once for each tracker.
+class StateReader:
+    """Reads the state of a batch's worlds, once for each tracker.
 
     Args:
         batch: The worlds.
@@ -39,11 +39,8 @@ class StateWriter:
         self.size = self._obstacles_at + OBSTACLE_SIZE * max(scenario.num_obstacles for scenario in scenarios)
         """Numbers in a state."""
 
-    def write(self, out: FloatArray, worlds: Any = slice(None)) -> None:
-        """Write the state of each world, or of some, for each of its trackers.
-
-        ``out`` is (trackers of these worlds, size).
-        """
+    def read(self, worlds: Any = ...) -> FloatArray:
+        """Return the state of each world, or of some, for each of its trackers, (trackers of these worlds, size)."""
         s, arrays = self._batch.scenario, self._batch.arrays
         w, tracker, disc = arrays.world[worlds][:, None, None], arrays.tracker[worlds], arrays.obstacle[worlds][:, None]
         n, m, at = s.num_trackers, s.num_obstacles, self._obstacles_at
@@ -59,8 +56,8 @@ class StateWriter:
         flags = t["broken_at"] == NEVER, t["slot"] >= 0, t["slot_distance"], t["sees"], t["touching"]
         trackers = *place, *heading, t["speed"], t["turn_rate"], *flags
         obstacles = *in_frame(disc["x"] - w["x"], disc["y"] - w["y"]), disc["radius"]
-        out[:] = 0
-        each = out.reshape(len(w), n, self.size)
-        each[..., :TARGET_SIZE] = np.concatenate(target, axis=-1)
-        each[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(len(w), n, -1)
-        each[..., at : at + m * OBSTACLE_SIZE] = np.stack(obstacles, -1).reshape(len(w), 1, m * OBSTACLE_SIZE)
+        rows = np.zeros((len(w), n, self.size), np.float32)
+        rows[..., :TARGET_SIZE] = np.concatenate(target, axis=-1)
+        rows[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(len(w), n, -1)
+        rows[..., at : at + m * OBSTACLE_SIZE] = np.stack(obstacles, -1).reshape(len(w), 1, m * OBSTACLE_SIZE)
+        return rows.reshape(-1, self.size)
