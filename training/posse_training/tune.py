@@ -249,7 +249,7 @@ class _Run:
         teams = [self.policy.with_settings(**values) for values in candidates]
         calls = [(Match(team, None, self.scenario, seed, split), worlds) for team in teams]
         if self.settings.ray is False:
-            return [guarded(None, partial(play_shard, *call)) for call in calls]
+            return [guarded(None, play_shard, *call) for call in calls]
         return all_on_ray(partial(play_shard, num_threads=1), calls)
 
     def _effective(self) -> list[str]:

@@ -149,24 +149,21 @@ def gathered_results(
     What is finished is kept until the context ends without an exception; see
     :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
     """
-    jobs = [Job(partial(_play_on_worker, one.match, one.time_limit), one.shards) for one in evaluations]
+    jobs = [
+        Job(partial(guarded, one.time_limit, partial(play_shard, one.match, num_threads=1)), one.shards)
+        for one in evaluations
+    ]
     with gathered(jobs, ray, done) as found:
         both = zip(evaluations, found, strict=True)
         yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
 
 
-def _play_on_worker(match: Match, time_limit: float | None, shard: range) -> Arrays:
-    """Play the worlds of a shard; with a time limit in a process of its own."""
-    found: Arrays = guarded(time_limit, partial(play_shard, match, shard, num_threads=1))
-    return found
-
-
-def guarded(limit: float | None, play: Callable[[], Any]) -> Any:
+def guarded(limit: float | None, play: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a call gives, with :func:`played_errors`; with a time limit, s, in a process of its own."""
     if limit is not None:
-        return apart(limit, guarded, None, play)
+        return apart(limit, guarded, None, play, *arguments)
     with played_errors():
-        return play()
+        return play(*arguments)
 
 
 @contextmanager
