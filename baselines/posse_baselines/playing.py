@@ -181,8 +181,8 @@ class Recorder:
 
     def _keep_frame(self, observations: FloatArray) -> None:
         state = self.batch.state if self._reads_state else {}  # it takes as long as a step of a hundred worlds
-        self._keep({name: poses_of(state, who) for name, who in _POSES.items() if name in self._names})
-        self._keep({name: state[name] for name in self._names if name in state} | {"observations": observations})
+        poses = {name: poses_of(state, who) for name, who in _POSES.items() if name in self._names}
+        self._keep({**state, **poses, "observations": observations})
 
     def _keep(self, rows: Mapping[str, Array]) -> None:
         """Keep copies of the rows that were asked for by name, or by the part of the name before the slash."""
