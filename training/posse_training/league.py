@@ -34,8 +34,6 @@ from posse_training.train.settings import BEST, LAST, TrainSettings
 
 TEAM: Final = "trackers"
 TARGET: Final = "target"
-OPPONENTS: Final = {TEAM: "target", TARGET: "team"}
-"""The setting of a training that names what a side plays against."""
 SCORES: Final = ("score", "safe_score", "contact_free")
 Cell = dict[str, Estimate]
 """What a team scores against a target, by these names; the last one is the share of episodes without contact."""
@@ -221,9 +219,9 @@ class League:
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,
-            OPPONENTS[side]: opponents,
+            "team" if side == TARGET else "target": opponents,
             "start": None if start is None else str(start),
-            "folder": str(run),
+            "folder": run,
             "evaluate_every": max(1, steps // 4),
             "evaluate_worlds": 64,
             "checkpoint_every": max(1, steps // 8),

@@ -45,10 +45,10 @@ def test_an_interrupted_training_ends_as_an_uninterrupted_one(
 
 
 SCRIPT = """
-import json, sys
+import json, pathlib, sys
 from posse_training.train import TrainSettings
 from posse_training.train.train import train
-train(TrainSettings.from_dict(json.loads(sys.argv[1])))
+train(TrainSettings.from_dict({**json.loads(sys.argv[1]), "folder": pathlib.Path(sys.argv[2])}))
 """
 
 
@@ -57,7 +57,7 @@ def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
     settings = small(tmp_path / "whole", steps=12_000, evaluate_every=6000, checkpoint_every=800)
     train(settings, console=quiet())
     folder = tmp_path / "killed"
-    command = [sys.executable, "-c", SCRIPT, json.dumps({**settings.to_dict(), "folder": str(folder)})]
+    command = [sys.executable, "-c", SCRIPT, json.dumps(settings.to_dict()), str(folder)]
     for target in (800, 4000):
         running, reached = subprocess.Popen(command), 0
         while reached < target:
