@@ -11,7 +11,6 @@ and the output to the left only those that change it.
 """
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -148,17 +147,14 @@ def _basis(settings: TrainSettings) -> npt.NDArray[np.float32]:
 
     Each has one weight, of an input that a mirror changes as it does the output.
     """
-    turns = list(_turns()) + ([False, True] if settings.advise is not None else [])  # features, then the proposal
+    turns: list[bool] = []  # of each input, whether a mirror changes its sign
+    for name in FEATURES.names or ():
+        turns += (False, True) if FEATURES[name] == np.complex64 else (name == _TURN,)
+    turns += (False, True) if settings.advise is not None else ()  # of the proposal
     basis = np.zeros((len(turns), MOTION, len(turns)), np.float32)
     for column, turn in enumerate(turns):
         basis[column, int(turn), column] = 1.0
     return basis
-
-
-def _turns() -> Iterator[bool]:
-    """Yield for each feature whether a mirror changes its sign."""
-    for name in FEATURES.names or ():
-        yield from (False, True) if FEATURES[name] == np.complex64 else (name == _TURN,)
 
 
 def _steps_of(s: TrainSettings) -> int:

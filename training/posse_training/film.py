@@ -66,10 +66,6 @@ class Team:
             self.scores.append(float(infos["score"][0]))
 
 
-Teams = list[tuple[str, Team]]
-"""With labels."""
-
-
 def film(
     policies: Sequence[tuple[str, Policy]],
     scenario: str | Scenario,
@@ -151,7 +147,7 @@ def film(
 
 
 def _frames(
-    teams: Teams, size: tuple[int, int], first: int, last: int, every: int, speed: float
+    teams: list[tuple[str, Team]], size: tuple[int, int], first: int, last: int, every: int, speed: float
 ) -> Iterator[Image.Image]:
     """Play all teams in step; yield one frame in ``every`` from a step on, and the last one.
 
@@ -198,7 +194,7 @@ def _write_key(image: Image.Image, entries: Sequence[tuple[str, style.Colour]], 
         right -= 16 * k
 
 
-def _with_curves(image: Image.Image, teams: Teams, first: int, last: int) -> Image.Image:
+def _with_curves(image: Image.Image, teams: list[tuple[str, Team]], first: int, last: int) -> Image.Image:
     """Return a frame with each team's score in the last second below, from the film's start to the present."""
     unit, larger = max(1.0, image.width / _NARROW), 3  # drawn larger, then averaged down
     k, height = unit * larger, round(_STRIP * unit)

@@ -11,6 +11,9 @@ from typing import Annotated, Any, Final
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
+from posse import Scenario
+from posse.declarations import unknown
+
 _WORDS: Final = {"true": True, "false": False, "none": None}
 
 
@@ -48,9 +51,6 @@ def settings_of(words: Sequence[str]) -> dict[str, Any]:
 
 def changes_of(words: Sequence[str]) -> dict[str, Any]:
     """Return :func:`settings_of` for a scenario; ValueError also for a name that is none of its settings."""
-    from posse import Scenario
-    from posse.declarations import unknown
-
     found, known = settings_of(words), Scenario.settings().keys() - {"name", "version", "meaning"}
     for name in found:
         if name not in known:

@@ -1,6 +1,5 @@
 """The estimates of a comparison, and their table."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -10,6 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from posse_baselines.files import write_json
 from posse_training.compare.contenders import Plays
 from posse_training.evaluation.results import Results, block_of
 from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
@@ -97,7 +97,7 @@ def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
     for (scenario, policy), found in plays.items():
         runs = {f"seed_{k}": _run(results, names) for k, results in enumerate(found.results)}
         tasks.setdefault(scenario, {})[policy] = runs
-    path.write_text(json.dumps({"posse": tasks}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_json(path, {"posse": tasks})
 
 
 def _run(results: Results, names: Sequence[str]) -> dict[str, Any]:
