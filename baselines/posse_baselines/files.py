@@ -25,11 +25,8 @@ def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Give the name of a file beside ``path`` to write to, which replaces ``path`` at the end.
 
-    No other writer has that name; it has the suffix of ``path``.
-
-    Raises:
-        OSError: It could not be written, for example because the disk is full; nothing is changed. Its ``filename`` is
-            ``path``.
+    No other writer has that name; it has the suffix of ``path``. An OSError, for example of a full disk, changes
+    nothing, and its ``filename`` is ``path``.
     """
     partial = path.with_name(f"{_PREFIX}{secrets.token_hex(8)}{path.suffix}")
     try:

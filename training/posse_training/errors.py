@@ -37,11 +37,7 @@ class MissingExtraError(UserError, ImportError):
 
 
 def require(extra: str, *packages: str) -> None:
-    """Import packages that an extra installs.
-
-    Raises:
-        MissingExtraError: One of them is not installed, or cannot be imported.
-    """
+    """Import packages that an extra installs, or raise MissingExtraError."""
     for package in packages:
         try:
             importlib.import_module(package)

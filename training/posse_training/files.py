@@ -20,11 +20,7 @@ def locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if missing: no other process can hold it meanwhile.
 
     The operating system releases the lock when the process ends, however it ends. Unfinished files of a process that
-    was killed are removed.
-
-    Raises:
-        RunFolderError: Another process holds it; the message has its number.
-        OSError: The folder cannot be written to.
+    was killed are removed. RunFolderError names the process that holds the folder already.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a+", encoding="utf-8") as file:

@@ -40,8 +40,7 @@ _KINDS: Final[dict[Any, Callable[[str], Any]]] = {str: str, int: int, float: flo
 class Standing:
     """What a policy scores on a scenario: mean safe score with its 95 % interval, score, share without contact.
 
-    Raises:
-        SettingsError: A text that a page could not show as it is, or numbers that no play has.
+    SettingsError for a text that a page could not show as it is, or numbers that no play has.
     """
 
     label: str
@@ -117,12 +116,7 @@ def standings_text(rows: Iterable[Standing]) -> str:
 
 
 def read_standings(path: str | Path) -> list[Standing]:
-    """Read and check a table; it loads no policy.
-
-    Raises:
-        OSError: The file cannot be read.
-        SettingsError: A column is missing, or a value is invalid; its line is named.
-    """
+    """Read and check a table, without loading a policy; SettingsError names the line of what is missing or invalid."""
     rows: list[Standing] = []
     content = Path(path).read_bytes()
     try:

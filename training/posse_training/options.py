@@ -30,11 +30,7 @@ def value_of(text: str) -> Any:
 
 
 def settings_of(words: Sequence[str]) -> dict[str, Any]:
-    """Return the settings that words like ``arena=6,4`` stand for.
-
-    Raises:
-        ValueError: A word without ``=``, or two of one setting.
-    """
+    """Return the settings that words like ``arena=6,4`` stand for; ValueError without ``=``, or for one set twice."""
     found: dict[str, Any] = {}
     for word in words:
         name, sign, text = word.partition("=")

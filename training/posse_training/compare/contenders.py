@@ -75,9 +75,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
 def check_code(name: str, read: Callable[[str], object] = load) -> None:
     """Load ``package.module:Class``, a policy or a target, in a process of its own.
 
-    Raises:
-        PolicyError: It is none.
-        PlayError: It took longer than :data:`LOADING`, or the process died.
+    PolicyError if it is none, PlayError if that took longer than :data:`LOADING` or the process died.
     """
     apart(LOADING, _load, name, read)
 

@@ -58,9 +58,7 @@ def encode(replay: Replay) -> bytes:
 def decode(data: bytes) -> Replay:
     """Return the argument of :func:`encode`, each number to half its :func:`resolution_of`.
 
-    Raises:
-        SettingsError: Data of another format.
-        ValueError, TypeError, KeyError, zlib.error: Damaged data.
+    SettingsError for another format; for damaged data ValueError, TypeError, KeyError or zlib.error.
     """
     text, _, raw = zlib.decompress(data).partition(b"\n")
     header = json.loads(text, object_hook=_from_json)

@@ -86,11 +86,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
 
 
 def read_replay(path: str | Path) -> Replay:
-    """Return the replay that a page shows, each number to half its column's resolution.
-
-    Raises:
-        SettingsError: No such file, or not a replay.
-    """
+    """Return the replay of a page, each number to half its column's resolution; SettingsError if there is none."""
     try:
         text = Path(path).read_text(encoding="utf-8")
         found = _DATA.search(text)

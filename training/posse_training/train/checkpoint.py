@@ -65,10 +65,8 @@ def start_from(
 ) -> None:
     """Give a model the networks of another run's checkpoint, and its statistics of inputs; optimisers start anew.
 
-    So does exploration, with ``log_deviation``.
-
-    Raises:
-        RunFolderError: There is no checkpoint, it is damaged, or of other networks or inputs.
+    So does exploration, with ``log_deviation``. RunFolderError as for :func:`read_checkpoint`, or if networks or inputs
+    are others.
     """
     state = read_checkpoint(folder)
     try:

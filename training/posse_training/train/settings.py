@@ -210,11 +210,7 @@ class TrainSettings:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Return the settings of :meth:`to_dict`.
-
-        Raises:
-            SettingsError: An unknown setting, or an invalid value.
-        """
+        """Return the settings of :meth:`to_dict`; SettingsError for an unknown or invalid one."""
         fitted = {name: value for name, value in values.items() if not name.startswith(("versions", "digest of "))}
         known = {f.name for f in dataclasses.fields(cls)}
         for name in fitted:
@@ -271,11 +267,7 @@ _ELSEWHERE = {
 
 
 def read_settings(path: Path) -> TrainSettings:
-    """Return the settings of a run folder's ``settings.json``.
-
-    Raises:
-        SettingsError: There is no such file, or it is damaged.
-    """
+    """Return the settings of a run folder's ``settings.json``; SettingsError if it is missing or damaged."""
     try:
         return TrainSettings.from_dict(read_json(path))
     except FileNotFoundError:

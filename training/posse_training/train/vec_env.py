@@ -115,11 +115,7 @@ class TeamVecEnv(VecEnv):
         return {f"{k}.{name}": array for k, group in enumerate(self._groups) for name, array in group.arrays().items()}
 
     def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
-        """Go back to the state of :meth:`arrays`.
-
-        Raises:
-            KeyError, ValueError: The state is of other worlds.
-        """
+        """Go back to the state of :meth:`arrays`; KeyError or ValueError if it is of other worlds."""
         for name, array in self.arrays().items():
             array[...] = saved[name]
         if any(array.tobytes() != saved[name].tobytes() for name, array in self.arrays().items()):

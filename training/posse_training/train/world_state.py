@@ -24,11 +24,8 @@ class StateReader:
     """Reads the state of a batch's worlds, once for each tracker.
 
     Args:
-        batch: The worlds.
+        batch: The worlds; ValueError if a policy inside the batch moves trackers.
         scenarios: States have places for the most trackers and obstacles that any of these has; missing ones are zeros.
-
-    Raises:
-        ValueError: A policy inside the batch moves trackers.
     """
 
     def __init__(self, batch: Batch, scenarios: Sequence[Scenario]) -> None:

@@ -91,8 +91,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
 def divided(settings: TrainSettings) -> list[tuple[Pairing, range]]:
     """Return every pairing with its part of the worlds, by their shares.
 
-    Raises:
-        SettingsError: Too few worlds for one in each share, or in each scenario that is drawn of a family.
+    SettingsError if there are too few for one in each share, or in each scenario that is drawn of a family.
     """
     pairs = pairings(settings)
     ends = np.cumsum([0, *(pair.share for pair in pairs)])
