@@ -134,17 +134,16 @@ class Encoder(OwnArrays):
     def __init__(
         self, encoding: Encoding, layout: ObservationLayout, num_worlds: int, robots: int | None = None
     ) -> None:
-        self.encoding, self.layout = encoding, layout
-        self.estimates = np.zeros((num_worlds, robots or layout.scenario.num_trackers), ESTIMATE)
+        self.encoding, self.layout, s = encoding, layout, layout.scenario
+        self.estimates = np.zeros((num_worlds, robots or s.num_trackers), ESTIMATE)
         self.estimates["age"] = -1.0
         self._columns, self._unknown = encoding.columns(layout)
-        slots = np.array([complex(*slot) for slot in layout.scenario.slot_offsets], np.complex64)
+        slots = np.array([complex(*slot) for slot in s.slot_offsets], np.complex64)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
-        first = bool(np.abs(slots).max() > layout.scenario.sensing_range)
-        noisy = layout.scenario.range_noise > 0.0 or layout.scenario.bearing_noise > 0.0
-        share, patience = np.float32(_SHARE if noisy else 1.0), np.float32(patience_of(layout.scenario))
-        half, slowest = complex(*layout.scenario.half_sides), np.float32(min(layout.scenario.tracker_speeds))
-        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, patience)
+        first = bool(np.abs(slots).max() > s.sensing_range)
+        share = np.float32(_SHARE if s.range_noise > 0.0 or s.bearing_noise > 0.0 else 1.0)
+        half, slowest = complex(*s.half_sides), np.float32(min(s.tracker_speeds))
+        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, np.float32(patience_of(s)))
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""

@@ -1,11 +1,13 @@
 """Lower bounds for comparisons: policies that stand still, act at random, or go straight at the target."""
 
-from typing import Any, Final
+import functools
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray
+from posse.numeric import FloatArray
 from posse_baselines.policy import BasePolicy, Memory, check_observations
 
 _SHIFT: Final = np.uint64(40)
@@ -26,6 +28,12 @@ class Idle(BasePolicy):
         return actions, memory
 
 
+@functools.cache
+def _factors(*shape: int) -> npt.NDArray[np.uint64]:
+    """Return the factors (N, 2 + m, F) that make draws of observations."""
+    return np.random.default_rng(0).integers(2**64, size=shape, dtype=np.uint64)
+
+
 class Random(BasePolicy):
     """Every number of every action is drawn uniformly from [-1, 1).
 
@@ -34,24 +42,12 @@ class Random(BasePolicy):
 
     name = "random"
 
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the factors (N, 2 + m, F) that make draws of observations."""
-        s = super().begin(layout, num_worlds).scenario
-        shape = s.num_trackers, 2 + s.message_size, layout.size
-        return np.random.default_rng(0).integers(2**64, size=shape, dtype=np.uint64)
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory as it is."""
-        return memory
-
-    def arrays(self, memory: Memory) -> dict[str, Any]:
-        """Return none: the factors are always those of :meth:`begin`."""
-        return {}
-
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return random speeds, turn rates and messages."""
+        s = memory.scenario
         words = np.ascontiguousarray(observations, np.float32).view(np.uint32).astype(np.uint64)
-        draws = np.einsum("eif,iaf->eia", words, memory) >> _SHIFT  # the highest bits of products depend on all others
+        factors = _factors(s.num_trackers, 2 + s.message_size, memory.size)
+        draws = np.einsum("eif,iaf->eia", words, factors) >> _SHIFT  # the highest bits of products depend on all others
         return draws.astype(np.float32) * _TO_BOTH_SIDES - np.float32(1.0), memory
 
 
