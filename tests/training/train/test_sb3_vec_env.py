@@ -175,6 +175,9 @@ def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> No
     for at in (True, False):
         env.reset()
         assert [batch.arrays.world["x"][0] == 1.0 for batch in env.batches] == [at, at]
+    env.set_options({"reset_mask": np.array([True, False])})
+    with pytest.raises(ValueError, match="reset_mask leaves episodes running"):
+        env.reset()
     wrong = np.zeros((10, 2))
     wrong[9, 0] = np.nan
     for actions, words in ((wrong, "nan"), (np.zeros((5, 4)), r"shape \(5, 4\), wanted \(10, 2\)")):

@@ -73,7 +73,7 @@ class TeamVecEnv(VecEnv):
         """Start an episode in every world; return the observations (slots, size).
 
         A seed given by :meth:`seed` restarts the worlds from episode 0 of that seed, once, and options given by
-        :meth:`set_options` are those of :meth:`posse.Batch.reset`, once.
+        :meth:`set_options` are those of :meth:`posse.Batch.reset` but ``reset_mask``, once.
         """
         observations = np.concatenate([group.reset(self._seeds[0], self._options[0]) for group in self._groups])
         self._reset_seeds()
@@ -191,6 +191,8 @@ class SlotGroup:
 
     def reset(self, seed: int | None, options: dict[str, Any] | None = None) -> FloatArray:
         """Start a shortened episode in every world; return the observations (slots, size)."""
+        if (options or {}).get("reset_mask") is not None:
+            raise ValueError("reset_mask leaves episodes running, and slots all begin one: leave it out")
         raw = self.batch.reset(seed=seed, options=options)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
         self.restart(np.ones(worlds, np.bool_))
