@@ -468,8 +468,7 @@ class sensor(Declaration):  # noqa: N801
 class Declarations(NamedTuple):
     """The declarations of a scenario, each kind in order of evaluation: the built-in ones, and those that it names."""
 
-    fields: tuple[field, ...]
-    """Observation fields, except sonar and messages."""
+    fields: tuple[field, ...]  # observation fields, except sonar and messages
     motions: tuple[target_motion, ...]
     sensors: tuple[sensor, ...]
     metrics: tuple[metric, ...]

@@ -41,34 +41,23 @@ Orders = npt.NDArray[np.uint8]
 class Fixed(NamedTuple):
     """The arguments of a kernel that stay the same for a batch."""
 
-    config: Records
-    """(1,) :data:`posse.rules.state.CONFIG`."""
-    slots: Records
-    """(N,) :data:`posse.rules.state.SLOT`."""
-    weights: FloatArray
-    """(K,) weight of each reward term."""
-    target_weights: FloatArray
-    """(K,) the same for a target that is an agent."""
+    config: Records  # (1,) CONFIG
+    slots: Records  # (N,) SLOT
+    weights: FloatArray  # (K,) weight of each reward term
+    target_weights: FloatArray  # (K,) the same for a target that is an agent
     worlds: WorldArrays
-    scratch: Records
-    """(threads,) :data:`posse.rules.state.SCRATCH`."""
+    scratch: Records  # (threads,) SCRATCH
 
 
 class Results(NamedTuple):
     """Outputs of a pass over the worlds."""
 
-    observations: FloatArray
-    """(E, rows, F)."""
-    rewards: FloatArray
-    """(E, rows)."""
-    terms: FloatArray
-    """(E, rows, K)."""
-    scores: FloatArray
-    """(E,)."""
-    terminated: BoolArray
-    """(E,)."""
-    truncated: BoolArray
-    """(E,)."""
+    observations: FloatArray  # (E, rows, F)
+    rewards: FloatArray  # (E, rows)
+    terms: FloatArray  # (E, rows, K)
+    scores: FloatArray  # (E,)
+    terminated: BoolArray  # (E,)
+    truncated: BoolArray  # (E,)
 
 
 @compiled

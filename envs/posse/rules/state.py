@@ -311,24 +311,15 @@ ODOMETRY_AT: Final = _begin(ODOMETRY, Odometry._fields[0])
 class WorldArrays(NamedTuple):
     """The arrays of a batch, which together with the scenario are its complete state."""
 
-    world: Records
-    """(E,) :func:`world_record`."""
-    tracker: Records
-    """(E, N) :data:`TRACKER`."""
-    obstacle: Records
-    """(E, M) :data:`OBSTACLE`."""
-    heard: Records
-    """(E, N, N) :data:`HEARD`; (E, 0, 0) if the radio is perfect, which stores nothing."""
-    broadcast: Records
-    """(E, D + 1, N) :data:`BROADCAST`; (E, 0, 0) if the radio is perfect."""
-    heard_message: FloatArray
-    """Message parts written by policies, (E, N, N, m) float32, by receiver and sender."""
-    message: FloatArray
-    """The same of messages sent, (E, D + 1, N, m) float32, by step modulo D + 1."""
-    odometry: Records
-    """(E, N) :data:`ODOMETRY`; (E, 0) if nothing drifts."""
-    command: FloatArray
-    """Commanded motions not yet executed, (E, ``command_delay``, N, 2) float32, by step modulo ``command_delay``."""
+    world: Records  # (E,) world_record()
+    tracker: Records  # (E, N) TRACKER
+    obstacle: Records  # (E, M) OBSTACLE
+    heard: Records  # (E, N, N) HEARD; (E, 0, 0) if the radio is perfect, which stores nothing
+    broadcast: Records  # (E, D + 1, N) BROADCAST; (E, 0, 0) if the radio is perfect
+    heard_message: FloatArray  # numbers that policies added, (E, N, N, m) float32, by receiver and sender
+    message: FloatArray  # the same of what was sent, (E, D + 1, N, m) float32, by step modulo D + 1
+    odometry: Records  # (E, N) ODOMETRY; (E, 0) if nothing drifts
+    command: FloatArray  # commands not yet executed, (E, d, N, 2) float32, by step modulo d = command_delay
 
     @classmethod
     def allocate(cls, scenario: Scenario, num_worlds: int) -> WorldArrays:

@@ -63,8 +63,7 @@ class Observers(NamedTuple):
     first: int
     end: int
     i: int
-    now: bool
-    """Whether they know their team-mates as they are now, not as last heard."""
+    now: bool  # whether they know their team-mates as they are now, not as last heard
 
 
 class View(NamedTuple):
@@ -73,45 +72,29 @@ class View(NamedTuple):
     Positions and directions are in the common frame.
     """
 
-    number: Lanes
-    """Number of the tracker; -1: the target."""
-    x: Lanes
-    """m."""
+    number: Lanes  # number of the tracker; -1: the target
+    x: Lanes  # m
     y: Lanes
     heading_cos: Lanes
     heading_sin: Lanes
-    speed: Lanes
-    """m/s."""
-    turn_rate: Lanes
-    """rad/s, positive to the left."""
-    touching: Lanes
-    """1 while it touches anything, else 0."""
-    working: Lanes
-    """0 once it is broken, else 1."""
-    step: Lanes
-    """Control steps since the start."""
-    max_speed: Lanes
-    """m/s."""
-    max_turn_rate: Lanes
-    """rad/s."""
-    target_known: Mask
-    """Whether it has a fix of the target, described by the following."""
-    target_seen: Lanes
-    """1 while its own sensor sees the target, else 0."""
-    target_step: Lanes
-    """Control step of the fix."""
-    target_dx: Lanes
-    """Vector to the target at the fix, m; for a bearing: a unit vector."""
+    speed: Lanes  # m/s
+    turn_rate: Lanes  # rad/s, positive to the left
+    touching: Lanes  # 1 while it touches anything, else 0
+    working: Lanes  # 0 once it is broken, else 1
+    step: Lanes  # control steps since the start
+    max_speed: Lanes  # m/s
+    max_turn_rate: Lanes  # rad/s
+    target_known: Mask  # whether it has a fix of the target, described by the following
+    target_seen: Lanes  # 1 while its own sensor sees the target, else 0
+    target_step: Lanes  # control step of the fix
+    target_dx: Lanes  # vector to the target at the fix, m; for a bearing: a unit vector
     target_dy: Lanes
     target_distance: Lanes
-    target_cos: Lanes
-    """Heading of the target at the fix."""
+    target_cos: Lanes  # heading of the target at the fix
     target_sin: Lanes
-    target_frame_cos: Lanes
-    """The slot frame ψ."""
+    target_frame_cos: Lanes  # the slot frame ψ
     target_frame_sin: Lanes
-    target_vx: Lanes
-    """Velocity from successive fixes, m/s."""
+    target_vx: Lanes  # velocity from successive fixes, m/s
     target_vy: Lanes
 
 
@@ -125,22 +108,16 @@ class Mate(NamedTuple):
     """A team-mate of each of eight observers: current or as last received."""
 
     number: Lanes
-    age: Lanes
-    """Age of the data, s."""
-    dx: Lanes
-    """Vector to it, common frame, m."""
+    age: Lanes  # age of the data, s
+    dx: Lanes  # vector to it, common frame, m
     dy: Lanes
-    distance: Lanes
-    """m."""
-    ahead: Lanes
-    """Its direction in the robot's frame; may exceed 1 by rounding."""
+    distance: Lanes  # m
+    ahead: Lanes  # its direction in the robot's frame; may exceed 1 by rounding
     left: Lanes
     heading_cos: Lanes
     heading_sin: Lanes
-    speed: Lanes
-    """m/s."""
-    turn_rate: Lanes
-    """rad/s."""
+    speed: Lanes  # m/s
+    turn_rate: Lanes  # rad/s
 
 
 @compiled
@@ -200,30 +177,18 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
 class Generated(NamedTuple):
     """The generated functions, for compiled code, and the lengths of what they write."""
 
-    write_own: Any
-    """Writes the own fields of eight observers."""
-    write_mate: Any
-    """Writes the fields of a team-mate of each of eight observers; the values for "unknown" where there is none."""
-    reward: Any
-    """Returns the reward of a tracker, and writes the values of its terms, (K,)."""
-    target_reward: Any
-    """Returns the same of a target that is an agent."""
-    draw_motion: Any
-    """Clears the memories of the target's motion, and draws its parameters for an episode."""
-    set_goal: Any
-    """Sets the goal heading of a scripted target."""
-    sees: Any
-    """Returns whether the target, (dx, dy) away, is in sight of a tracker."""
-    measure: Any
-    """Returns the vector to the target as measured."""
-    clear_sums: Any
-    """Sets the sums of the metrics to zero."""
-    add_to_sums: Any
-    """Adds a control step to the sums of the metrics."""
-    own_size: int
-    """Length of the observation before the sonar."""
-    mate_size: int
-    """Length of a team-mate's part, without its message."""
+    write_own: Any  # writes the own fields of eight observers
+    write_mate: Any  # writes those of a team-mate of each; the values for "unknown" where there is none
+    reward: Any  # returns the reward of a tracker, and writes the values of its terms, (K,)
+    target_reward: Any  # returns the same of a target that is an agent
+    draw_motion: Any  # clears the memories of the target's motion, and draws its parameters for an episode
+    set_goal: Any  # sets the goal heading of a scripted target
+    sees: Any  # returns whether the target, (dx, dy) away, is in sight of a tracker
+    measure: Any  # returns the vector to the target as measured
+    clear_sums: Any  # sets the sums of the metrics to zero
+    add_to_sums: Any  # adds a control step to the sums of the metrics
+    own_size: int  # length of the observation before the sonar
+    mate_size: int  # length of a team-mate's part, without its message
 
 
 @compiled
