@@ -54,8 +54,8 @@ class MaskType(types.Type):
 
 
 _LANES, _MASK, _NUMBER = LanesType("Lanes"), MaskType("Mask"), types.float32
-_INDEX: Final = ir.IntType(32)
-_FLOATS, _BITS, _INTEGERS = (ir.VectorType(kind, WIDTH) for kind in (ir.FloatType(), ir.IntType(1), _INDEX))
+_FLOAT, _BYTE, _INDEX = ir.FloatType(), ir.IntType(8), ir.IntType(32)
+_FLOATS, _BITS, _INTEGERS = (ir.VectorType(kind, WIDTH) for kind in (_FLOAT, ir.IntType(1), _INDEX))
 register_model(LanesType)(lambda manager, kind: models.PrimitiveModel(manager, kind, _FLOATS))
 register_model(MaskType)(lambda manager, kind: models.PrimitiveModel(manager, kind, _BITS))
 
@@ -72,16 +72,25 @@ def _key(function: Callable[..., Any]) -> Any:
 
 
 def _emits(emit: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[F], F]:
-    """Declare a function or an operator to numba: its types, and what emits LLVM instructions for its arguments."""
+    """Declare a function or an operator to numba: its types, and what emits LLVM instructions for its arguments.
+
+    If the first argument is a class, of arrays or records, any of that class will do; ``emit`` is given its address.
+    """
 
     def declare(function: F) -> F:
         @infer_global(function, typing_key=_key(function))
-        class Template(ConcreteTemplate):
+        class Template(AbstractTemplate if isinstance(arguments[0], type) else ConcreteTemplate):  # type: ignore[misc]
             cases = (signature(result, *arguments),)
+
+            def generic(self, args: Any, kws: Any) -> Any:
+                return signature(result, args[0], *arguments[1:])
 
         @lower_builtin(_key(function), *arguments)
         def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            return emit(builder, *values)
+            if arguments[0] is types.Array:
+                values = context.make_array(sig.args[0])(context, builder, values[0]).data, *values[1:]
+            found = emit(builder, *values)
+            return context.get_dummy_value() if result is types.none else found
 
         return function
 
@@ -103,7 +112,7 @@ def _intrinsic(name: str) -> Callable[..., Any]:
     """Return an emitter that calls a function of LLVM on a number or on eight."""
 
     def emit(builder: Any, value: Any) -> Any:
-        suffix = "f32" if value.type == ir.FloatType() else f"v{WIDTH}f32"
+        suffix = "f32" if value.type == _FLOAT else f"v{WIDTH}f32"
         kind = ir.FunctionType(value.type, [value.type])
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.{suffix}"), [value])
 
@@ -228,63 +237,37 @@ def transpose(rows: tuple[Lanes, ...]) -> tuple[Lanes, ...]:
     return tuple(np.array([np.broadcast_to(row, WIDTH) for row in rows], np.float32).T)
 
 
-def _accesses(emit: Callable[..., Any], kind: Any, result: Any, *more: Any) -> Callable[[F], F]:
-    """Declare a function of an array or record and a place, in elements or bytes; ``emit`` is given the address."""
-
-    def declare(function: F) -> F:
-        @infer_global(function, typing_key=_key(function))
-        class Template(AbstractTemplate):
-            def generic(self, args: Any, kws: Any) -> Any:
-                return signature(result, args[0], types.intp, *more)
-
-        @lower_builtin(_key(function), kind, types.intp, *more)
-        def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            memory, place, *value = values
-            if kind is types.Array:
-                memory = context.make_array(sig.args[0])(context, builder, memory).data
-            if kind is types.Record or emit is _prefetch:
-                memory = builder.bitcast(memory, ir.IntType(8).as_pointer())
-            found = emit(builder, builder.gep(memory, [place]), *value)
-            return context.get_dummy_value() if result is types.none else found
-
-        return function
-
-    return declare
+def _eight_at(builder: Any, memory: Any, place: Any, unit: Any = _FLOAT) -> Any:
+    """Return the address of eight numbers, so many units into memory."""
+    return builder.bitcast(builder.gep(builder.bitcast(memory, unit.as_pointer()), [place]), _FLOATS.as_pointer())
 
 
-def _read(builder: Any, address: Any) -> Any:
-    return builder.load(builder.bitcast(address, _FLOATS.as_pointer()), align=4)
-
-
-def _write(builder: Any, address: Any, value: Any) -> Any:
-    return builder.store(value, builder.bitcast(address, _FLOATS.as_pointer()), align=4)
-
-
-def _prefetch(builder: Any, address: Any) -> Any:
+def _prefetch(builder: Any, memory: Any, offset: Any) -> Any:
+    address = builder.gep(builder.bitcast(memory, _BYTE.as_pointer()), [offset])
     kind = ir.FunctionType(ir.VoidType(), [address.type, _INDEX, _INDEX, _INDEX])
     function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
     to_write, near, of_data = (ir.Constant(_INDEX, number) for number in (1, 3, 1))
     return builder.call(function, [address, to_write, near, of_data])
 
 
-@_accesses(_read, types.Array, _LANES)
+@_emits(lambda b, array, k: b.load(_eight_at(b, array, k), align=4), _LANES, types.Array, types.intp)
 def load(array: FloatArray, index: int) -> Lanes:
     """Return the eight numbers from ``index`` on, which must not be negative."""
     return array[index + _PLACES]
 
 
-@_accesses(_write, types.Array, types.none, _LANES)
+@_emits(lambda b, array, k, x: b.store(x, _eight_at(b, array, k), align=4), types.none, types.Array, types.intp, _LANES)
 def store(array: FloatArray, index: int, value: Lanes) -> None:
     """Write eight numbers from ``index`` on."""
     array[index + _PLACES] = value
 
 
-@_accesses(_prefetch, types.Array, types.none)
+@_emits(_prefetch, types.none, types.Array, types.intp)
 def fetch(array: npt.NDArray[Any], offset: int) -> None:
     """Prefetch the cache line ``offset`` bytes into an array, for writing; no other effect."""
 
 
-@_accesses(_read, types.Record, _LANES)
+@_emits(lambda b, record, k: b.load(_eight_at(b, record, k, _BYTE), align=4), _LANES, types.Record, types.intp)
 def load_fields(record: Record, offset: int) -> Lanes:
     """Return the eight float32 from ``offset`` bytes into a record on."""
     return np.frombuffer(record.tobytes(), np.float32, WIDTH, offset)
