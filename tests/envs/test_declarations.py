@@ -34,17 +34,17 @@ MISTAKES: Final = {
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
     'def own(c, w):\n    """?"""\nown.__name__ = "a-b"\nposse.metric("1")(own)': "'a-b': use letters, digits, _$",
-    FIELD.format('"1", 0, 1', "c, v", "v.x").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
+    FIELD.format('"1", 0, 1', "c", "1").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
     # Options.
-    **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
+    **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.own.x"): rf"size={size} must be a whole number from 1 to 256"
        for size in ("0", "2.0", "1000000000", "True")},
-    FIELD.format('"1", 0, 1, "no"', "c, v", "v.x"): r"unknown='no' is not a number between low=0 and high=1",
+    FIELD.format('"1", 0, 1, "no"', "c, v", "v.own.x"): r"unknown='no' is not a number between low=0 and high=1",
     FIELD.format('"1", 1, 2', "c, v, m", "m.age"): r"unknown=0.0 is not a number between low=1 and high=2",
-    FIELD.format('"1", 0, lambda s: s.arena', "c, v", "v.x"): r"high=inf in 'constant' is not a finite number",
-    FIELD.format('"1", 0, lambda s: s.sped', "c, v", "v.x"): r"high in 'constant': .*no attribute 'sped'",
-    FIELD.format('"1", 1, 0', "c, v", "v.x"): r"low=1 is above high=0",
-    FIELD.format('"1", 0, 1', "c, v", "v.x / 0.0"): r"it returned \S+, which is not from low=0 to high=1",
-    FIELD.format('"m", -99, 99', "c, v", "posse.numeric.choose(v.step > 0.5, v.x / 0.0, v.x)")
+    FIELD.format('"1", 0, lambda s: s.arena', "c, v", "v.own.x"): r"high=inf in 'constant' is not a finite number",
+    FIELD.format('"1", 0, lambda s: s.sped', "c, v", "v.own.x"): r"high in 'constant': .*no attribute 'sped'",
+    FIELD.format('"1", 1, 0', "c, v", "v.own.x"): r"low=1 is above high=0",
+    FIELD.format('"1", 0, 1', "c, v", "v.own.x / 0.0"): r"it returned \S+, which is not from low=0 to high=1",
+    FIELD.format('"m", -99, 99', "c, v", "posse.numeric.choose(v.step > 0.5, v.own.x / 0.0, v.own.x)")
     .replace("posse.batch", "b = posse.batch").replace(".reset()", "\nb.reset()\nb.step(np.zeros(b.action_shape))"):
         r"own \(main.py:1\): it returned \S+, which is not from low=-99",
     MOTION.format(", memory=3", "", "pass"): r"memory=3 must be a list of names",
@@ -56,15 +56,15 @@ MISTAKES: Final = {
     + 'posse.batch(sensor="own").reset()': "an observation is not finite: .*sensor='own' measures",
     **{f"{AGAIN}\n{call}": "declarations have changed since these worlds were made: make a new batch"
        for call in ("old.copies(1)", "new.restore(saved)", "pickle.loads(pickle.dumps(old))")},
-    FIELD.format('"1", 0, 1', "c, v", "v.x").replace("posse.batch", "old = posse.batch").replace(".reset()", "\n")
-    + FIELD.format('"1", 0, 1, size=2', "c, v", "v.x, v.y").replace(".reset()", "\npickle.loads(pickle.dumps(old))"):
+    FIELD.format('"1", 0, 1', "c, v", "v.own.x").replace("posse.batch", "old = posse.batch").replace(".reset()", "\n")
+    + FIELD.format('"1", 0, 1, size=2', "c, v", "v.step, 0").replace(".reset()", "\npickle.loads(pickle.dumps(old))"):
         "declarations have changed",
     # What the compiler says.
-    FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): unknown field 'sped' \(did you mean 'speed'",
+    FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): unknown field 'sped' \(did you mean 'own.speed'",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"own \(main.py:1\): (.|\n)*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"It creates an array, a list or a text",
-    FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"it returns Lanes, not 2 numbers",
-    FIELD.format('"1", 0, 1', "c, v", "v.x if v.x > 0 else v.y"): r"write choose\(condition, one, other\), line \d",
+    FIELD.format('"1", 0, 1, size=2', "c, v", "v.own.x"): r"it returns Lanes, not 2 numbers",
+    FIELD.format('"1", 0, 1', "c, v", "v.step if v.step > 0 else 1"): r"write choose\(condition, one, other\), line \d",
 }  # fmt: skip
 
 ATTEMPTS = """

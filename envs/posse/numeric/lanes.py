@@ -13,7 +13,7 @@ if nothing is compiled; the decorators above it say what it compiles to.
 
 import operator
 from collections.abc import Callable
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -61,9 +61,12 @@ register_model(MaskType)(lambda manager, kind: models.PrimitiveModel(manager, ki
 
 
 def tuple_of_lanes(kind: type) -> types.NamedTuple:
-    """Return numba's type of a named tuple whose fields are declared as Lanes or Mask."""
-    fields = kind.__annotations__.values()  # names in forward references
-    return types.NamedTuple([_MASK if "Mask" in str(each) else _LANES for each in fields], kind)
+    """Return numba's type of a named tuple whose fields are declared as Lanes, as Mask, or as such a tuple."""
+    hints, fields = get_type_hints(kind), []
+    for name, written in kind.__annotations__.items():  # names in forward references: both are Any among the hints
+        single = _MASK if "Mask" in str(written) else _LANES
+        fields.append(tuple_of_lanes(hints[name]) if hasattr(hints[name], "_fields") else single)
+    return types.NamedTuple(fields, kind)
 
 
 def _key(function: Callable[..., Any]) -> Any:

@@ -69,25 +69,25 @@ def within_one(value: Lanes) -> Lanes:
 @field("1", -1, 1, size=2)
 def heading(c: Record, v: View) -> Pair:
     """Own heading in the common frame, cosine and sine."""
-    return within_one(v.heading_cos), within_one(v.heading_sin)
+    return within_one(v.own.heading_cos), within_one(v.own.heading_sin)
 
 
 @field("m", lambda s: -_place(s), _place, size=2)
 def position(c: Record, v: View) -> Pair:
     """Own odometry in the common frame, x and y."""
-    return v.x, v.y
+    return v.own.x, v.own.y
 
 
 @field("m/s", 0, _fast)
 def speed(c: Record, v: View) -> Lanes:
     """Own speed."""
-    return v.speed
+    return v.own.speed
 
 
 @field("rad/s", lambda s: -_most_turn(s), _most_turn)
 def turn_rate(c: Record, v: View) -> Lanes:
     """Own turn rate, positive to the left."""
-    return v.turn_rate
+    return v.own.turn_rate
 
 
 @field("1", 0, 1)
@@ -130,25 +130,25 @@ for _name in ("formation_distance", "formation_spacing"):
 @field("m/s", 0, _fast)
 def max_speed(c: Record, v: View) -> Lanes:
     """Own greatest speed."""
-    return v.max_speed
+    return v.own.max_speed
 
 
 @field("rad/s", 0, _most_turn)
 def max_turn_rate(c: Record, v: View) -> Lanes:
     """Own greatest turn rate."""
-    return v.max_turn_rate
+    return v.own.max_turn_rate
 
 
 @field("s", 0, lambda s: max(1, max(s.tracker_speeds) / s.tracker_acceleration * SLACK))
 def acceleration_time(c: Record, v: View) -> Lanes:
     """Time from rest to full speed; 0: no acceleration limit."""
-    return choose(v.number < ZERO, ZERO, v.max_speed * c.per_acceleration)  # of a target agent: 0
+    return choose(v.number < ZERO, ZERO, v.own.max_speed * c.per_acceleration)  # of a target agent: 0
 
 
 @field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK))
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
-    return choose(v.number < ZERO, ZERO, v.max_turn_rate * c.per_turn_acceleration)
+    return choose(v.number < ZERO, ZERO, v.own.max_turn_rate * c.per_turn_acceleration)
 
 
 for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range"):
@@ -236,19 +236,19 @@ def target_bearing(c: Record, v: View) -> Pair:
 @field("1", -1, 1, unknown=0, size=2)
 def target_heading(c: Record, v: View) -> Pair:
     """Heading of the target at the fix, ego."""
-    return _direction(v, v.target_cos, v.target_sin)
+    return _direction(v, v.fix.cos, v.fix.sin)
 
 
 @field("1", -1, 1, unknown=0, size=2)
 def target_frame(c: Record, v: View) -> Pair:
     """Slot frame ψ at the fix, ego."""
-    return _direction(v, v.target_frame_cos, v.target_frame_sin)
+    return _direction(v, v.fix.frame_cos, v.fix.frame_sin)
 
 
 @field("m/s", lambda s: -_fast(s), _fast, unknown=0, size=2)
 def target_velocity(c: Record, v: View) -> Pair:
     """Velocity of the target, estimated from successive fixes, ego."""
-    ahead, left = ego(v, v.target_vx, v.target_vy)
+    ahead, left = ego(v, v.fix.vx, v.fix.vy)
     return _if_known(v, ahead), _if_known(v, left)
 
 

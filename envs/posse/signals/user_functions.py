@@ -49,6 +49,9 @@ def _why_not(function: Function, arguments: tuple[Any, ...], returns: str) -> st
         missing = re.search(r"Unknown attribute '(\w+)'", message)
         if missing or isinstance(error, KeyError):  # an attribute of a view, or of a record
             fields = {name for kind in arguments for name in getattr(kind, "fields", ())}
+            for view in (kind for kind in arguments if isinstance(kind, types.NamedTuple)):
+                parts = zip(view.fields, view.types, strict=True)
+                fields |= {f"{name}.{each}" for name, part in parts for each in getattr(part, "fields", ())}
             name = missing[1] if missing else error.args[0]
             return unknown("field", name, sorted(fields)).partition(";")[0]  # without the list, which fills a page
         if ">>> bool(Mask)" in message:

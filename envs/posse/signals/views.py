@@ -72,36 +72,24 @@ class View(NamedTuple):
     Positions and directions are in the common frame.
     """
 
-    number: Lanes  # number of the tracker; -1: the target
-    x: Lanes  # m
-    y: Lanes
-    heading_cos: Lanes
-    heading_sin: Lanes
-    speed: Lanes  # m/s
-    turn_rate: Lanes  # rad/s, positive to the left
+    number: Lanes  # of the tracker; -1: the target
+    own: Pose  # as it knows it
     touching: Lanes  # 1 while it touches anything, else 0
     working: Lanes  # 0 once it is broken, else 1
     step: Lanes  # control steps since the start
-    max_speed: Lanes  # m/s
-    max_turn_rate: Lanes  # rad/s
     target_known: Mask  # whether it has a fix of the target, described by the following
     target_seen: Lanes  # 1 while its own sensor sees the target, else 0
     target_step: Lanes  # control step of the fix
     target_dx: Lanes  # vector to the target at the fix, m; for a bearing: a unit vector
     target_dy: Lanes
-    target_distance: Lanes
-    target_cos: Lanes  # heading of the target at the fix
-    target_sin: Lanes
-    target_frame_cos: Lanes  # the slot frame ψ
-    target_frame_sin: Lanes
-    target_vx: Lanes  # velocity from successive fixes, m/s
-    target_vy: Lanes
+    target_distance: Lanes  # m
+    fix: Fix
 
 
 @compiled
 def ego(v: View, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     """Return a vector of the common frame in the robot's frame: ahead, and to the left."""
-    return in_frame(x, y, v.heading_cos, v.heading_sin)
+    return in_frame(x, y, v.own.heading_cos, v.own.heading_sin)
 
 
 class Mate(NamedTuple):
@@ -148,29 +136,17 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         dx, dy = dx - own.x, dy - own.y
     return View(
         number=number,
-        x=own.x,
-        y=own.y,
-        heading_cos=own.heading_cos,
-        heading_sin=own.heading_sin,
-        speed=own.speed,
-        turn_rate=own.turn_rate,
+        own=own,
         touching=touching,
         working=working,
         step=from_int(target.step),
-        max_speed=own.max_speed,
-        max_turn_rate=own.max_turn_rate,
         target_known=fixed_at >= ZERO,
         target_seen=sees,
         target_step=fixed_at,
         target_dx=dx,
         target_dy=dy,
         target_distance=root(dx * dx + dy * dy),
-        target_cos=fix.cos,
-        target_sin=fix.sin,
-        target_frame_cos=fix.frame_cos,
-        target_frame_sin=fix.frame_sin,
-        target_vx=fix.vx,
-        target_vy=fix.vy,
+        fix=fix,
     )
 
 
@@ -236,7 +212,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
             heard = Heard(*columns(worlds.heard[:, i, j], first, end, HEARD_AT))
             x, y, sent = heard.x, heard.y, from_int(heard.step)
             known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
-        ahead, left = ego(v, x - v.x, y - v.y)
+        ahead, left = ego(v, x - v.own.x, y - v.own.y)
         number = choose(known, np.float32(j), -ONE)
         distance = choose(known, root(ahead * ahead + left * left), FAR)
         if bits(distance <= load(mate_distance[places - 1], 0)) == 0:
@@ -264,7 +240,7 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
     )
     x, y, cos, sin, speed, turn_rate, sent, _ = transpose(rows)
     age = eight(ZERO) if observers.now else (v.step - from_int(sent)) * c.control_step
-    distance, dx, dy = load(s.mate_distance[p], 0), x - v.x, y - v.y
+    distance, dx, dy = load(s.mate_distance[p], 0), x - v.own.x, y - v.own.y
     ahead, left = ego(v, dx, dy)
     apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
     return Mate(
