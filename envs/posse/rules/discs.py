@@ -49,11 +49,11 @@ def surroundings_within(c: Record, obstacles: Records, x: np.float32, y: np.floa
 
 
 @compiled
-def columns(records: Records, first: int, end: int, offset: int) -> tuple[Lanes, ...]:
+def columns(records: Records, first: int, end: int, offset: int = 0) -> tuple[Lanes, ...]:
     """Return a block of eight fields of eight records, field by field, of which a named tuple is made.
 
     The records are those from ``first`` on; from ``end`` on, the one before is repeated. ``offset`` is where the block
-    begins, such as :data:`posse.rules.state.POSE_AT` for a :class:`posse.rules.state.Pose`.
+    begins in a record, such as :data:`posse.rules.state.POSE_AT` for a :class:`posse.rules.state.Pose`.
     """
     last = end - 1
     rows = (

@@ -303,9 +303,7 @@ TARGET_POSE_AT: Final = _begin(record_type(*_WORLD), TargetPose._fields[0])
 POSE_AT: Final = _begin(TRACKER, Pose._fields[0])
 CONDITION_AT: Final = _begin(TRACKER, Condition._fields[0])
 FIX_AT: Final = _begin(TRACKER, "fix")
-HEARD_AT: Final = _begin(HEARD, Heard._fields[0])
-ODOMETRY_AT: Final = _begin(ODOMETRY, Odometry._fields[0])
-"""Where the blocks begin in their records, bytes."""
+"""Where the blocks begin in the records that hold more, bytes."""
 
 
 class WorldArrays(NamedTuple):

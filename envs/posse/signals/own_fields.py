@@ -276,7 +276,9 @@ def neighbour_range(c: Record, v: View, m: Mate) -> Lanes:
 @field("1", -1, 1, unknown=0, size=2)
 def neighbour_bearing(c: Record, v: View, m: Mate) -> Pair:
     """Direction from the robot to the team-mate's position, ego."""
-    return within_one(m.ahead), within_one(m.left)
+    ahead, left = ego(v, m.dx, m.dy)
+    apart, per_metre = m.distance > ZERO, ONE / greater(m.distance, TINY)
+    return within_one(choose(apart, ahead * per_metre, ONE)), within_one(choose(apart, left * per_metre, ZERO))
 
 
 @field("1", -1, 1, unknown=0, size=2)

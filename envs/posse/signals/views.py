@@ -14,16 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posse.numeric import ONE, TINY, ZERO, FloatArray, Lanes, Mask, Record, choose, compiled
+from posse.numeric import ONE, ZERO, FloatArray, Lanes, Mask, Record, choose, compiled
 from posse.numeric.lanes import bits, eight, from_int, greater, lesser, load, load_fields, root, store, transpose
 from posse.rules.discs import FAR, columns
 from posse.rules.kinematics import in_frame, turned
 from posse.rules.state import (
     CONDITION_AT,
     FIX_AT,
-    HEARD_AT,
     NEVER,
-    ODOMETRY_AT,
     POSE_AT,
     TARGET_POSE_AT,
     Condition,
@@ -38,23 +36,18 @@ from posse.rules.state import (
 
 @compiled
 def write_block(block: tuple[Lanes, ...], first: int, rows: FloatArray) -> None:
-    """Write eight columns, the first of them column ``first``, to at most eight rows."""
+    """Write eight columns, the first of them column ``first``, to at most eight rows: of fewer, the last repeatedly."""
     a, b, c, d, e, f, g, h = transpose(block)
+    last = len(rows) - 1
     # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, first, rows)
-    _write_row(b, 1, first, rows)
-    _write_row(c, 2, first, rows)
-    _write_row(d, 3, first, rows)
-    _write_row(e, 4, first, rows)
-    _write_row(f, 5, first, rows)
-    _write_row(g, 6, first, rows)
-    _write_row(h, 7, first, rows)
-
-
-@compiled
-def _write_row(row: Lanes, lane: int, first: int, rows: FloatArray) -> None:
-    if lane < len(rows):
-        store(rows[lane], first, row)
+    store(rows[0], first, a)
+    store(rows[min(1, last)], first, b)
+    store(rows[min(2, last)], first, c)
+    store(rows[min(3, last)], first, d)
+    store(rows[min(4, last)], first, e)
+    store(rows[min(5, last)], first, f)
+    store(rows[min(6, last)], first, g)
+    store(rows[min(7, last)], first, h)
 
 
 class Observers(NamedTuple):
@@ -100,8 +93,6 @@ class Mate(NamedTuple):
     dx: Lanes  # vector to it, common frame, m
     dy: Lanes
     distance: Lanes  # m
-    ahead: Lanes  # its direction in the robot's frame; may exceed 1 by rounding
-    left: Lanes
     heading_cos: Lanes
     heading_sin: Lanes
     speed: Lanes  # m/s
@@ -116,7 +107,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, target: Target
         number = eight(np.float32(i))
         own = Pose(*columns(worlds.tracker[:, i], first, end, POSE_AT))
         if c.drifts:  # its pose as it knows it
-            error = Odometry(*columns(worlds.odometry[:, i], first, end, ODOMETRY_AT))
+            error = Odometry(*columns(worlds.odometry[:, i], first, end))
             cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
             x, y = own.x + error.x, own.y + error.y
             own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
@@ -209,7 +200,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
         if now:
             x, y, known = load(s.team_x[j], 0), load(s.team_y[j], 0), v.step >= ZERO
         else:
-            heard = Heard(*columns(worlds.heard[:, i, j], first, end, HEARD_AT))
+            heard = Heard(*columns(worlds.heard[:, i, j], first, end))
             x, y, sent = heard.x, heard.y, from_int(heard.step)
             known = (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
         ahead, left = ego(v, x - v.own.x, y - v.own.y)
@@ -241,16 +232,12 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
     x, y, cos, sin, speed, turn_rate, sent, _ = transpose(rows)
     age = eight(ZERO) if observers.now else (v.step - from_int(sent)) * c.control_step
     distance, dx, dy = load(s.mate_distance[p], 0), x - v.own.x, y - v.own.y
-    ahead, left = ego(v, dx, dy)
-    apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
     return Mate(
         number=load(s.mate_number[p], 0),
         age=age,
         dx=dx,
         dy=dy,
         distance=distance,
-        ahead=choose(apart, ahead * per_metre, ONE),
-        left=choose(apart, left * per_metre, ZERO),
         heading_cos=cos,
         heading_sin=sin,
         speed=speed,
@@ -265,7 +252,7 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, lane: int, s: 
     j = max(int(s.mate_number[p, lane]), 0)
     if observers.now:
         return load_fields(worlds.tracker[e, j], POSE_AT)
-    return load_fields(worlds.heard[e, observers.i, j], HEARD_AT)
+    return load_fields(worlds.heard[e, observers.i, j], 0)
 
 
 @compiled
