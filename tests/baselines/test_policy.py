@@ -182,9 +182,6 @@ def test_a_memory_that_cannot_be_saved_or_restarted_is_refused() -> None:
         load("idle").restart(np.zeros(3), np.ones(3, np.bool_))
 
 
-# --- refusals ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("policy", [load("ddcs-distributed"), policy_for(posse.batch().layout, outputs=5)])
 def test_a_policy_with_more_to_say_than_messages_hold_is_refused(policy: Policy) -> None:
     size = policy.message_size

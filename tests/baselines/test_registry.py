@@ -69,9 +69,6 @@ def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
             load(name)
 
 
-# --- targets -------------------------------------------------------------------------------------
-
-
 def test_a_scripted_target_is_the_scenarios_motion() -> None:
     assert set(target_names()) >= {"constant", "accelerating", "smart"}
     assert "agent" not in target_names()

@@ -8,7 +8,6 @@ import importlib
 import os
 import re
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -58,9 +57,6 @@ def test_every_setting_is_in_the_manual(site: Path) -> None:
     assert [word for word in wanted if word not in text] == []
 
 
-# --- in a browser ---------------------------------------------------------------------------------
-
-
 PHONE, WIDE = (390, 844), (1300, 1000)
 SCREENS = 10
 LOOK = """() => {
@@ -72,24 +68,13 @@ LOOK = """() => {
 """Width and height of the page, blocks of code that are cut off, and names that are broken inside."""
 
 
-class _Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
-        pass
-
-
-@pytest.fixture
-def address(site: Path) -> Iterator[str]:
-    handler = functools.partial(_Quiet, directory=str(site))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}/"
-        server.shutdown()
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(("width", "screen"), [WIDE, PHONE])
-def test_pages_fit_are_short_and_ask_no_other_host(site: Path, address: str, width: int, screen: int) -> None:
-    with chromium() as browser:
+def test_pages_fit_are_short_and_ask_no_other_host(site: Path, width: int, screen: int) -> None:
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(site))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, chromium() as browser:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}/"
         page = browser.new_page(viewport={"width": width, "height": screen})
         asked: list[str] = []
         failed: list[str] = []
@@ -105,6 +90,7 @@ def test_pages_fit_are_short_and_ask_no_other_host(site: Path, address: str, wid
             wide, height, cut, broken = page.evaluate(LOOK)
             if wide > width or broken or height > SCREENS * screen or (cut and width == WIDE[0]):
                 faults.append((where, wide, height, cut, broken))
+        server.shutdown()
         assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
         assert failed == []
         assert faults == []

@@ -156,9 +156,6 @@ def test_the_generated_source_can_be_read() -> None:
         assert call in source
 
 
-# --- examples of the manual -----------------------------------------------------------------------
-
-
 EXAMPLES = {Path(title).stem: text for _, title, text in blocks("docs/extend.md") if title is not None}
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.support.pages import ROOT, blocks
@@ -20,17 +21,8 @@ pytestmark = pytest.mark.skipif(
 
 def run(*command: str | Path, cwd: Path, **environment: str) -> str:
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    done = subprocess.run(
-        [str(part) for part in command],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=900,
-        check=False,
-        env={**kept, **environment},
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
-    return done.stdout
+    settings: dict[str, Any] = {"cwd": cwd, "env": {**kept, **environment}, "timeout": 900}
+    return subprocess.check_output([str(part) for part in command], text=True, **settings)
 
 
 @pytest.fixture(scope="module")

@@ -1,18 +1,61 @@
 """``posse tune``: what it finds, how it resumes, and what it refuses."""
 
+import dataclasses
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.support.runs import killed_at, quiet
-from tests.support.tunable import BEST, POLICY, small
 
-from posse_baselines import DDCS, tunables
+from posse.numeric import FloatArray
+from posse_baselines import DDCS, Memory, tunables
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import tuned
 from posse_training.errors import RunFolderError
 from posse_training.tune import Space, TuneSettings, _Run, tune
+
+BEST = 0.35
+
+
+@dataclass(frozen=True)
+class Bias:
+    """Two settings, of which one does nothing."""
+
+    bias: float = tuned(0.8, "", 0.0, 1.0)
+    idle: float = tuned(0.5, "s", 0.1, 1.0)
+
+
+class Biased(DDCS):
+    """``ddcs-distributed`` with a turn command that is off unless ``bias`` is ``BEST``."""
+
+    def __init__(self, settings: Bias | None = None) -> None:
+        super().__init__(name="biased")
+        self.bias = settings or Bias()
+        self._settings, self.settings = self.settings, self.bias  # type: ignore[assignment]
+
+    def settings_for(self, scenario: Any) -> Any:
+        return self._settings
+
+    def with_settings(self, **values: Any) -> "Biased":
+        return Biased(dataclasses.replace(self.bias, **values))
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        actions, memory = super().act(observations, memory)
+        actions[..., 1] = np.clip(actions[..., 1] + 2.0 * (self.bias.bias - BEST), -1.0, 1.0)
+        return actions, memory
+
+
+POLICY = "tests.training.test_tune:Biased"
+
+
+def small(out: Path, **changes: Any) -> TuneSettings:
+    """Settings of a tuning that takes a second."""
+    values: dict[str, Any] = {"policy": POLICY, "scenario": "paper-distributed", "seed": 3, "out": out, "every": 2}
+    values |= {"generations": 5, "population": 6, "worlds": 4, "validation_worlds": 6}
+    return TuneSettings(**(values | changes))
 
 
 def card_of(settings: TuneSettings) -> dict[str, Any]:

@@ -62,9 +62,6 @@ def test_a_broken_leader_is_followed_by_the_nearest_that_works() -> None:
     assert (agree(now) & (waited == 0)).all()
 
 
-# --- rule ii: who sees no other robot leads itself -----------------------------------------------
-
-
 def test_searchers_have_a_leader_and_who_hears_nobody_leads_itself() -> None:
     # Three hear each other, the lowest number leads; the fourth is out of everybody's reach.
     pose = [(-9.0, -9.0, 0.0), (-9.0, -7.0, 0.0), (-9.0, -5.0, 0.0), (9.0, -9.0, 1.0)]

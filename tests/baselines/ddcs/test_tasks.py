@@ -21,9 +21,6 @@ def metrics(name: str, scenario: str, *forbidden: str) -> dict[str, Any]:
     return play(posse.batch(scenario, 24, seed=3, split="train", message_size=5), policy)
 
 
-# --- when they change ----------------------------------------------------------------------------
-
-
 def test_searching_lasts_until_the_target_is_seen_or_reported() -> None:
     begun_by_hearing = 0
     for now in drive("ddcs-distributed", "search", 40, 60, split="train"):
@@ -52,9 +49,6 @@ def test_converging_and_flocking_change_with_hysteresis() -> None:
         before = task
     assert begun >= 20 * 4
     assert (task == FLOCKING).mean() > 0.95
-
-
-# --- what each does ------------------------------------------------------------------------------
 
 
 def test_converging_is_at_full_speed_and_flocking_at_the_formations() -> None:
@@ -94,9 +88,6 @@ def test_a_tracker_that_hears_of_another_leader_holds_the_flocks_course() -> Non
     held = np.concatenate(speeds)
     assert len(held) > 15
     assert (np.abs(held - 0.6) < 0.02).mean() > 0.85  # the safeguard may slow some
-
-
-# --- what is lost without a change ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

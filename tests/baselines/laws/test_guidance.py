@@ -22,9 +22,6 @@ def short_way(angle: float) -> float:
     return cmath.phase(cmath.exp(1j * angle))
 
 
-# --- geometry of a pair --------------------------------------------------------------------------
-
-
 def test_line_of_sight_points_from_tracker_to_target() -> None:
     assert line_of_sight(1 + 2j, 1 + 5j) == pytest.approx((3.0, math.pi / 2))
     assert line_of_sight(1 + 2j, complex(-3.0, 2.0 - 1e-300)) == (4.0, math.pi)
@@ -43,9 +40,6 @@ def test_bearing_rate_is_the_derivative_of_the_bearing(
     rate = guidance.bearing_rate(r, cmath.rect(target_speed, target_theta - sigma), cmath.rect(speed, theta - sigma))
     step = 1e-5
     assert rate == pytest.approx(cmath.phase(gap(step) / gap(-step)) / (2 * step), abs=1e-7)
-
-
-# --- the law -------------------------------------------------------------------------------------
 
 
 @given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES)
@@ -74,9 +68,6 @@ def test_the_rate_is_the_derivative_of_the_heading(
     assert guidance.lawful_rate(k, sigma_rate, psi_rate) == pytest.approx(slope, abs=1e-6)
 
 
-# --- the speed of (13) ---------------------------------------------------------------------------
-
-
 @given(st.floats(0.3, 5.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.3, 5.0))
 def test_the_range_closes_at_its_gain(
     r: float, sigma: float, target_theta: float, delta: float, target_speed: float, wanted: float
@@ -98,9 +89,6 @@ def test_speed_in_the_slot_is_the_slots_whatever_its_heading() -> None:
             delta = short_way(cmath.phase(slot) - sigma)
             speed = guidance.maintenance_speed(cmath.rect(0.6, -sigma), delta, 1.2, 1.2, psi_rate, 1.0, 5.0)
             assert speed == pytest.approx(abs(slot), abs=1e-9)
-
-
-# --- heading regulation --------------------------------------------------------------------------
 
 
 def body_of(theta: float = 0.0, speed: float = 0.0, limits: tuple[float, float] = (1e4, 1e4), dt: float = 0.1) -> Any:
@@ -135,9 +123,6 @@ def test_a_robot_of_limited_turn_acceleration_brakes_its_turn() -> None:
 
 
 OFFSET = 0.15
-
-
-# --- l-φ -----------------------------------------------------------------------------------------
 
 
 @given(st.floats(0.3, 4.0), ANGLES, ANGLES, st.floats(0.5, 2.0), ANGLES, st.floats(0.0, 1.0), st.floats(-1.0, 1.0))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tests.support.drive import Floats, complex_of, drive
+from tests.support.drive import complex_of, drive
 from tests.support.reference.score import slots
 
 from posse import get_scenario
@@ -82,15 +82,11 @@ def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> N
 @pytest.mark.parametrize("theta", [math.pi, 0.5, -2.0])
 @pytest.mark.parametrize("name", ["pngl", "deviated-pursuit"])
 def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: float) -> None:
-    rng = np.random.default_rng(5)
-    worlds = 100
-    starts: list[Floats] = []
-    while len(starts) < worlds:  # behind the target, a metre apart at least
-        away = rng.uniform(-4.0, -1.0, 5) + 1j * rng.uniform(-2.5, 2.5, 5)
-        if min(abs(a - b) for i, a in enumerate(away) for b in away[:i]) > 0.6:
-            heading = rng.uniform(-math.pi, math.pi, 5)
-            turned = away * np.exp(1j * theta)
-            starts.append(np.stack([turned.real, turned.imag, heading], axis=-1))
+    # From behind the target, and apart from each other.
+    rng, worlds = np.random.default_rng(5), 100
+    away = rng.uniform(-4.0, -1.0, (worlds, 5)) + 1j * (np.arange(-2, 3) + rng.uniform(-0.2, 0.2, (worlds, 5)))
+    turned = rng.permuted(away, axis=1) * np.exp(1j * theta)
+    starts = np.stack([turned.real, turned.imag, rng.uniform(-math.pi, math.pi, (worlds, 5))], axis=-1)
     start: dict[str, Any] = {"tracker_pose": starts, "target_pose": np.tile([0.0, 0.0, theta], (worlds, 1))}
     seen = list(drive(name, "paper-distributed", worlds, 250, start_distance=(0.5, 6.0), **start))
     relative = np.stack([-now.line_of_sight for now in seen])

@@ -96,9 +96,6 @@ def test_the_planner_reads_only_the_batch_it_watches() -> None:
         begin(Planner(PlannerSettings(keep=5.0)), other)
 
 
-# --- the belief planner --------------------------------------------------------------------------
-
-
 def test_what_it_cannot_sense_changes_nothing() -> None:
     """Of two teams one is in sight of the target in part; where it is from the others, what it plans and the faults
     to come differ."""

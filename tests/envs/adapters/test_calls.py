@@ -132,9 +132,6 @@ def test_what_is_returned_is_never_overwritten(kind: str) -> None:
     assert same(held, kept)
 
 
-# --- actions --------------------------------------------------------------------------------------
-
-
 VALUES = np.array([[[0.5, -0.25], [1.0, -1.0]], [[0.0, 0.75], [-0.5, 1.0]]], np.float32)
 
 

@@ -111,9 +111,6 @@ def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_p
             np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=1e-3)
 
 
-# --- copies ---------------------------------------------------------------------------------------
-
-
 DRAWS = ("accelerating", "radio", "leader-loss", "field")
 
 

@@ -106,9 +106,6 @@ def test_the_measured_heading_of_the_target_is_noisy_and_with_it_the_slot_frame(
     np.testing.assert_allclose(frame, heading, atol=1e-6)  # ψ is the heading at the start
 
 
-# --- what is drawn beside the start ---------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", [1, 4])
 def test_drawn_trackers_break_at_drawn_times(number: int) -> None:
     batch = posse.batch(

@@ -140,9 +140,6 @@ def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(motion: str, turn:
     assert 5 < longest <= 2 * math.pi / turn / 0.1, "no longer than a turn on the spot takes"
 
 
-# --- motion and contact of one robot --------------------------------------------------------------
-
-
 F = np.float32
 
 

@@ -94,9 +94,6 @@ def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, are
     assert np.median(np.abs(places - places[0]).max(axis=0)) > 4.0, "it gets about"
 
 
-# --- the smart target ----------------------------------------------------------------------------
-
-
 def start(worlds: int, motion: str = "smart", **poses: Any) -> posse.Batch:
     batch = posse.batch("smart", worlds, target_motion=motion, autoreset="disabled")
     batch.reset(seed=3, options=poses)

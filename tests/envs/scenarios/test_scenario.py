@@ -138,16 +138,6 @@ def test_a_later_start_that_cannot_be_drawn_is_an_error_too(autoreset: str) -> N
         batch.step(np.zeros(batch.action_shape))
 
 
-def test_given_poses_need_no_draw() -> None:
-    batch = posse.batch(num_trackers=9, start_distance=(1.0, 1.001))
-    bearing = np.arange(9) * 0.7
-    poses = {"tracker_pose": np.stack([np.cos(bearing), np.sin(bearing), bearing], axis=-1), "target_pose": [0, 0, 0]}
-    with pytest.raises(ScenarioError, match="could not place num_trackers=9"):
-        batch.reset(seed=0)
-    batch.reset(seed=0, options=poses)
-    batch.step(np.zeros(batch.action_shape))
-
-
 @pytest.mark.parametrize("name", posse.scenario_names())
 def test_a_named_scenario_is_a_value(name: str) -> None:
     scenario = posse.get_scenario(name)
@@ -162,9 +152,6 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
     larger = posse.get_scenario(name, num_trackers=6)
     assert {k for k, v in larger.to_dict().items() if scenario.to_dict()[k] != v} == {"num_trackers"}
     assert larger.replace(num_trackers=5) == scenario
-
-
-# --- the named scenarios --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", posse.scenario_names())

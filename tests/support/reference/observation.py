@@ -6,24 +6,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from tests.support.reference.motion import free_gaps
-from tests.support.reference.senses import Said, Senses, sonar
+from tests.support.reference.senses import Senses, sonar
 from tests.support.reference.state import TOUCHING, Array, State, headings, positions, working
 
 import posse
 from posse.scenarios.scenario import FORMATIONS
-
-
-def _in_order(recent: list[tuple[float, int, Said]], told: npt.NDArray[Any]) -> list[tuple[float, int, Said]]:
-    """Return team-mates, nearest first; those equally near within rounding in the given order."""
-    places = [int(number) for number in told]
-    ordered = list(recent)
-    for k in range(len(ordered)):
-        ties = [m for m in ordered[k:] if m[0] - ordered[k][0] < 1e-5 and m[1] in places]
-        if ties:
-            first = min(ties, key=lambda m: places.index(m[1]))
-            ordered.remove(first)
-            ordered.insert(k, first)
-    return ordered
 
 
 def observation(s: posse.Scenario, state: State, i: int, senses: Senses, told: npt.NDArray[Any]) -> dict[str, Array]:
@@ -96,8 +83,10 @@ def observation(s: posse.Scenario, state: State, i: int, senses: Senses, told: n
         for (listener, j), words in senses.heard.items()
         if listener == i and (step - words.step) * s.control_step <= s.forget_after + 1e-6
     ]
-    recent.sort(key=lambda found: found[:2])
-    for spot, (_, j, words) in enumerate(_in_order(recent, told)[:k]):
+    spots = {int(number): spot for spot, number in enumerate(told)}
+    recent.sort(key=lambda found: (spots.get(found[1], k), found[0]))
+    assert (np.diff([found[0] for found in recent]) > -1e-5).all(), "nearest first, as told"
+    for spot, (_, j, words) in enumerate(recent[:k]):
         mates["number"][spot] = j
         mates["age"][spot] = (step - words.step) * s.control_step
         mates["range"][spot], mates["bearing"][spot] = place(words.place)

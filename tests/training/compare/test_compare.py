@@ -148,9 +148,6 @@ def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> Non
                 play(tmp_path / "busy")
 
 
-# --- against a given target -----------------------------------------------------------------------
-
-
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
 

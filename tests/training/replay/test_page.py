@@ -63,9 +63,6 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
     assert "did not play the same world: target differ" in capsys.readouterr().err
 
 
-# --- words ----------------------------------------------------------------------------------------
-
-
 WAY = [0.0] * 10
 FULL = [1.0] * 40
 MOST = "most of the difference arose"
