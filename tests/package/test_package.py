@@ -8,7 +8,6 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.support.pages import ROOT, blocks
@@ -21,8 +20,8 @@ pytestmark = pytest.mark.skipif(
 
 def run(*command: str | Path, cwd: Path, **environment: str) -> str:
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    settings: dict[str, Any] = {"cwd": cwd, "env": {**kept, **environment}, "timeout": 900}
-    return subprocess.check_output([str(part) for part in command], text=True, **settings)
+    words, variables = [str(part) for part in command], {**kept, **environment}
+    return subprocess.check_output(words, cwd=cwd, env=variables, text=True, timeout=900)
 
 
 @pytest.fixture(scope="module")

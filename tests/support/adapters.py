@@ -4,12 +4,6 @@ import pickle
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-
-
-def f32(values: Any) -> npt.NDArray[np.float32]:
-    """Return an array of actions as policies return it."""
-    return np.array(values, np.float32)
 
 
 def out_of_band(thing: Any) -> Any:

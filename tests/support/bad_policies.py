@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 
 from posse import get_scenario
-from posse.numeric import FloatArray
-from posse_baselines import BasePolicy, Memory, load
-from posse_baselines.policies.simple import Idle
+from posse_baselines.policies.simple import Idle, Pursuit
 
 
 class Raises(Idle):
@@ -64,24 +62,21 @@ class Crashes(Idle):
         os._exit(9)
 
 
-class Watched(BasePolicy):
+class Watched(Pursuit):
     """``pursuit``, which in one shard does a deed: it ends the process, waits for the file ``go``, or fails.
 
-    Each shard leaves the node that plays it in ``begun-N``, N from 1 on. The first one from N = 4 on does the deed, and
-    leaves its node in ``chosen``; with ``"die always"`` each ends its process.
+    Each shard leaves a file ``begun-N``, N from 1 on. The first one from N = 4 on does the deed; with ``"die always"``
+    each ends its process.
     """
 
     name = "watched"
 
     def __init__(self, folder: Path, deed: str) -> None:
-        self._folder, self._deed, self._pursuit = folder, deed, load("pursuit")
+        self._folder, self._deed = folder, deed
 
-    def begin(self, layout: Any, num_worlds: int) -> Memory:
-        import ray
-
-        node = ray.get_runtime_context().get_node_id()
-        number = next(n for n in range(1, 1000) if _claim(self._folder / f"begun-{n}", node))
-        chosen = self._deed == "die always" or (number >= 4 and _claim(self._folder / "chosen", node))
+    def begin(self, layout: Any, num_worlds: int) -> Any:
+        number = next(n for n in range(1, 1000) if _claim(self._folder / f"begun-{n}"))
+        chosen = self._deed == "die always" or (number >= 4 and _claim(self._folder / "chosen"))
         deed = self._deed if chosen else ""
         if deed.startswith("die"):
             os.kill(os.getpid(), signal.SIGKILL)
@@ -90,13 +85,11 @@ class Watched(BasePolicy):
         until = time.monotonic() + 60.0
         while deed == "wait" and not (self._folder / "go").exists() and time.monotonic() < until:
             time.sleep(0.05)
-        return self._pursuit.begin(layout, num_worlds)
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        return self._pursuit.act(observations, memory)
+        return super().begin(layout, num_worlds)
 
 
-def _claim(path: Path, content: str) -> bool:
-    with suppress(FileExistsError), path.open("x") as file:
-        return file.write(content) > 0
+def _claim(path: Path) -> bool:
+    with suppress(FileExistsError):
+        path.touch(exist_ok=False)
+        return True
     return False

@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
-from tests.support.adapters import f32, out_of_band, same
+from tests.support.adapters import out_of_band, same
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
 
 from posse import REWARD_TERMS, parallel_env
@@ -119,6 +119,14 @@ def test_an_environment_goes_on_from_where_it_was_saved() -> None:
     assert list(env.step(actions)[0]) == env.agents == env.possible_agents
 
 
+def test_infos_say_who_works() -> None:
+    env = parallel_env("leader-loss", target_motion="agent")
+    env.reset()
+    env.batch.arrays.tracker["broken_at"][0, 1] = 0
+    infos = env.step(dict.fromkeys(env.agents, np.array([0, 0], np.float32)))[-1]
+    assert [infos[agent]["working"] for agent in env.possible_agents] == [True, False, True, True, True, True]
+
+
 @one_by_one
 def test_what_is_returned_is_never_overwritten(kind: str) -> None:
     subject = Subject(kind)
@@ -188,14 +196,16 @@ def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kin
 def test_worlds_differ_without_a_seed_and_follow_from_one(kind: str) -> None:
     starts = [Subject(kind, **seed).env.reset()[0] for seed in ({}, {}, {"seed": 4})]
     assert not same(starts[0], starts[1])
-    assert same(starts[2], Subject(kind).env.reset(seed=4)[0])
+    subjects = Subject(kind), Subject(kind)
+    assert all(same(starts[2], subject.env.reset(seed=4)[0]) for subject in subjects)
+    assert len({subject.env.np_random.random() for subject in subjects}) == 1
 
 
 @pytest.mark.parametrize("kind", ["team", "solo"])
 def test_contact_terminates_where_it_is_asked_for(kind: str) -> None:
     subject = Subject(kind, terminate_on_contact=True, num_trackers=1, target_speed=0.0, horizon=40)
     subject.env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
-    ends = [subject.env.step(subject.action(f32([[[1, 0]]])))[2:4] for _ in range(7)]
+    ends = [subject.env.step(subject.action(np.array([[[1, 0]]], np.float32)))[2:4] for _ in range(7)]
     assert ends == [(False, False)] * 6 + [(True, False)]
 
 

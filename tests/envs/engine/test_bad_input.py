@@ -9,10 +9,10 @@ import pytest
 from gymnasium.error import ResetNeeded
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.support.adapters import f32
 from tests.support.attack import LONG_NAME, MAKERS, Subject
 
 import posse
+from posse.signals.layout import StateLayout
 
 WHOLE = r"must be a whole number in"
 
@@ -71,8 +71,8 @@ def test_the_first_bad_action_is_named_wherever_it_stands(number: int, value: fl
 
 
 BAD_ACTIONS: list[tuple[bool, Any, str]] = [
-    (False, f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
-    (False, f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
+    (False, np.array([0, np.nan], np.float32), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
+    (False, np.array([0, 0, 0], np.float32), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
     (False, ["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
     (False, [[0], [0, 1]], r"tracker_3 is not an array"),
     (True, 15, r"tracker_3 is 15, outside 0 to 14"),
@@ -84,7 +84,7 @@ BAD_ACTIONS: list[tuple[bool, Any, str]] = [
 def test_a_bad_action_names_its_agent(discrete: bool, action: Any, message: str) -> None:
     env = posse.parallel_env(discrete_actions=discrete)
     env.reset(seed=0)
-    before, good = env.state(), dict.fromkeys(env.agents, 2 if discrete else f32([0, 0]))
+    before, good = env.state(), dict.fromkeys(env.agents, 2 if discrete else np.array([0, 0], np.float32))
     without = {agent: good[agent] for agent in good if agent != "tracker_2"}
     for actions, words in (
         ({**good, "tracker_3": action}, message),
@@ -173,3 +173,5 @@ def test_bad_snapshots_and_copies() -> None:
     for into in (5, LONG_NAME, batch, other):
         subject.refused(lambda into=into: batch.copies(1, into=into))
     assert not other._started
+    with pytest.raises(ValueError, match="do not fit: S ="):
+        StateLayout(batch.scenario).views(np.zeros((2, 9), np.float32))
