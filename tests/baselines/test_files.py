@@ -22,6 +22,8 @@ def test_an_error_while_writing_leaves_the_old_file_alone(tmp_path: Path, error:
         write_half()
     assert str(caught.value) in ("", f"[Errno {errno.ENOSPC}] the disk is full: {str(path)!r}")
     assert path.read_bytes() == b"old"
+    with pytest.raises(IsADirectoryError, match=f"directory: {str(tmp_path)!r}$"):
+        write_atomically(tmp_path, b"new")
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -141,6 +141,9 @@ def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
     names = ("tracker_x", "actions", "terminated")
     found = rollout(posse.batch("constant", 8, **settings), load("random"), names)
     assert len(set(found.lengths)) > 1
+    cut = rollout(posse.batch("constant", 8, **settings), load("random"), steps=15)
+    assert min(cut.lengths) < 15
+    assert np.isfinite(cut.metrics["score"]).all()
     for world, length in enumerate(found.lengths):
         alone = rollout(posse.batch("constant", 1, first_world=world, **settings), load("random"), names)
         one = found.episode(world)
@@ -156,6 +159,8 @@ def test_what_is_recorded_stays_as_it_was() -> None:
     played = rollout(posse.batch("constant", 1), erasing, ["observations", "annotations"], steps=3)
     assert played["observations"].any(axis=-1).all()
     assert "array" not in repr(played).replace("lengths=array", "")
+    short = posse.batch("constant", 1, autoreset="disabled", horizon=5, settle_time=0.1)
+    assert rollout(short, load("idle"), steps=9).steps == 5
 
 
 def test_what_cannot_be_recorded_or_played_is_named() -> None:
@@ -178,6 +183,7 @@ def test_what_cannot_be_recorded_or_played_is_named() -> None:
 def test_a_memory_that_cannot_be_saved_or_restarted_is_refused() -> None:
     with pytest.raises(PolicyError, match=r"'idle' cannot be saved: define its method arrays\(memory\)"):
         BasePolicy.arrays(load("idle"), np.zeros(3))  # type: ignore[arg-type]
+    assert load("idle").restart(None, np.ones(3, np.bool_)) is None
     with pytest.raises(PolicyError, match=r"'idle' must forget.*define restart\(memory, mask\)"):
         load("idle").restart(np.zeros(3), np.ones(3, np.bool_))
 

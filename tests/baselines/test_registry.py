@@ -76,7 +76,8 @@ def test_a_scripted_target_is_the_scenarios_motion() -> None:
     assert target.motion == "accelerating"
     assert target.policy is None
     assert load_target(target) is target
-    assert load_target("posse_baselines.policies.simple:Idle").motion == "agent"
+    resting = load_target("posse_baselines.policies.simple:Idle")
+    assert (resting.name, resting.motion) == ("idle", "agent")
 
 
 def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:

@@ -141,6 +141,8 @@ def test_a_pose_that_no_robot_of_the_scenario_reaches_is_told() -> None:
 def test_invalid_measurements_are_refused() -> None:
     robot = Robot("field", 1)
     beams = robot.scenario.sonar_beams
+    with pytest.raises(ValueError, match="before the first observation"):
+        robot.broadcast()
     before = robot.observe((0.0, 0.0, 0.0), 0.1, 0.0)
     for measured, words in (
         (((0.0, math.nan, 0.0), 0.0, 0.0), "pose"),

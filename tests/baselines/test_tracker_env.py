@@ -9,10 +9,11 @@ import pytest
 
 import posse
 from posse_baselines import PolicyError, begin, load
-from posse_baselines.tracker_env import TrackerEnv
+from posse_baselines.tracker_env import TrackerEnv, register
 
 
 def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
+    register()  # once more
     policy = load("pursuit")
     env = TrackerEnv("smart", number=2, teammates=policy, seed=5, horizon=40)
     own, _ = env.reset()
@@ -48,3 +49,5 @@ def test_what_cannot_be_played_is_refused(make: Any) -> None:
         make(scenario="constant", num_trackers=1)
     with pytest.raises(PolicyError, match="unknown policy 'pursiut'"):
         make(scenario="constant", teammates="pursiut")
+    with pytest.raises(TypeError, match="target_policy= is not possible"):
+        make(scenario="constant", target_policy=load("idle"))

@@ -26,9 +26,12 @@ AGAIN = (
 MISTAKES: Final = {
     # What is declared.
     "posse.reward_term('1')(int)": "reward term <class 'int'>: declare a function, made by def, not a type",
+    "import functools\nposse.metric('1')(functools.partial(max))": "declare a function, made by def, not a partial",
+    "posse.target_motion('own')(None)": "declare a function, made by def, not a NoneType",
     "posse.target_motion('own')(lambda c, w: None)": r"<lambda> \(main.py:1\): its docstring.* is missing",
     "@posse.reward_term\ndef own(c, w, t):\n    return 1": r'own \(main.py:1\): the decorator needs arguments: .*"1"',
     '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
+    '@posse.metric(1)\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit=1 must be a text",
     '@posse.metric("1")\ndef world(c, w):\n    """?"""': r"the name 'world' is that of another column of results",
     '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
@@ -160,7 +163,8 @@ EXAMPLES = {Path(title).stem: text for _, title, text in blocks("docs/extend.md"
 
 
 def test_another_process_and_a_command_import_a_users_module(tmp_path: Path) -> None:
-    code = """import functools, pickle, posse, subprocess, sys
+    code = """import functools, os, pickle, posse, subprocess, sys
+sys.path[:] = [part for part in sys.path if os.path.realpath(part) != os.getcwd()]  # as where a program is installed
 from posse_training.cli import main
 from posse_training.parallel import apart
 main("scenarios obstacles --import walls".split())

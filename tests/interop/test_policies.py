@@ -1,5 +1,6 @@
 """Functions and stable-baselines3 models play as policies, by the actions that they choose."""
 
+import functools
 from typing import Any
 
 import gymnasium
@@ -10,7 +11,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse_baselines import PolicyError, begin, deploy, from_function, load
+from posse_baselines import PolicyError, begin, deploy, from_function, load, stack_agents
 from posse_baselines.learned import Encoding
 from posse_baselines.learned.inputs import Encoder
 from posse_baselines.safeguard import Guard
@@ -84,12 +85,16 @@ def test_encoded_observations_are_played(safeguard: bool) -> None:
 def test_a_function_plays_as_a_policy() -> None:
     with pytest.raises(ValueError, match="message_size=-1 must be"):
         from_function(np.zeros_like, message_size=-1)
+    with pytest.raises(TypeError, match="takes a function, got 3"):
+        from_function(3)  # type: ignore[arg-type]
+    assert from_function(functools.partial(np.zeros_like)).name == "function"
 
     def ahead(observations: Any) -> Any:
         return np.full((*observations.shape[:2], 2), 0.5)
 
     policy = from_function(ahead)
     assert policy.name == "ahead"
+    assert stack_agents({"tracker_0": [0.0]}).dtype == np.float32
     assert (acted(policy)[1] == 0.5).all()
     spoken = acted(policy, message_size=2)[1]
     assert spoken.shape == (2, 5, 4)

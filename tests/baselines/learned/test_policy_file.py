@@ -40,7 +40,7 @@ def actions_of(policy: Policy) -> Any:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    path = tmp_path_factory.mktemp("policy") / "mine.safetensors"
+    path = tmp_path_factory.mktemp("policy") / "deep" / "mine.safetensors"
     POLICY.save(path)
     assert actions_of(load(path)).any()  # all modules are imported and all kernels compiled before anything is watched
     return path.read_bytes()
@@ -118,6 +118,7 @@ LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, 
         ({}, {"layers.0.weight": TENSORS["layers.0.weight"].astype(np.float64)}, "finite float32"),
         ({}, {"layers.2.bias": np.full_like(TENSORS["layers.2.bias"], np.nan)}, "finite float32"),
         ({}, {"layers.2.weight": LAST[:1]}, r"layers.2.weight has shape \(1, 16\), not \(2, 16\)"),
+        ({}, {"layers.2.weight": LAST[:1], "layers.2.bias": TENSORS["layers.2.bias"][:1]}, "gives 1"),
         ({}, {"layers.7.weight": LAST}, "is damaged"),
     ],
 )

@@ -80,3 +80,6 @@ def test_every_world_is_drawn() -> None:
     assert not np.array_equal(first, second)
     env.close()
     env.close()
+    assert env.closed
+    (blind := vector(num_envs=1)).reset(seed=0)
+    assert blind.render() is None

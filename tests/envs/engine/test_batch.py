@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from gymnasium.error import ResetNeeded
 from tests.support.adapters import out_of_band, same
 from tests.support.process import printed
 from tests.support.reference.state import snapshot
@@ -156,13 +157,21 @@ def test_what_copies_draw_follows_from_seed_and_step() -> None:
 
 
 def test_the_episode_after_a_copy_s_end_is_no_world_s() -> None:
-    batch = played("constant", 2, steps=9, horizon=10, settle_time=0.5)
+    batch = played("constant", 2, steps=9, horizon=10, settle_time=0.5, clip_actions=True)
     copies = batch.copies(2)
     for step in range(2):
         batch.step(actions_for(batch, step))
-        copies.step(repeated(batch, step))
+        copies.step(9 * repeated(batch, step))
     assert (copies.arrays.world["step"] == 0).all()
     assert len({*batch.arrays.world["x"].tolist(), *copies.arrays.world["x"].tolist()}) == 6
+
+
+def test_copies_go_on_where_the_worlds_that_they_replace_are_over() -> None:
+    settings: dict[str, Any] = {"horizon": 10, "settle_time": 0.5, "autoreset": "disabled"}
+    over, batch = (played("constant", 3, steps=steps, **settings) for steps in (10, 9))
+    with pytest.raises(ResetNeeded, match="world 0 and 2 more"):
+        over.step(actions_for(over, 0))
+    batch.copies(1, into=over).step(actions_for(batch, 0))
 
 
 def test_faults_that_have_begun_stay_and_others_are_drawn_anew() -> None:

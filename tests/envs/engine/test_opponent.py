@@ -91,6 +91,7 @@ class Wrong(Weaver):
     [
         (None, "must be real numbers, got None"),
         (np.zeros((WORLDS, 2)), r"actions of shape \(3, 2\), wanted \(3, 1, 2\)"),
+        (np.zeros((WORLDS, 1)), r"actions of shape \(3, 1\), wanted \(3, 1, 2\)"),
         (np.full((WORLDS, 1, 2), np.nan), r"\[0, 0, 0\] = nan is not a number in \[-1, 1\]"),
     ],
     ids=str,
@@ -158,6 +159,13 @@ def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
         contacts += terms["contact"]
     assert contacts == 1 == batch.metrics()["target_contacts"][0]
     assert scenario.to_dict()["target_reward_weights"] == weights
+
+
+def test_who_works_is_told_of_those_that_are_moved_from_outside() -> None:
+    batch = posse.PairedBatch(SHORT, 1, Crossing(), outside=1)
+    batch.reset()
+    batch.arrays.tracker["broken_at"][0, 1] = 0
+    assert batch.working.tolist() == [[False]]
 
 
 def test_a_copy_has_a_memory_of_its_own() -> None:

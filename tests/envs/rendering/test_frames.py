@@ -35,11 +35,14 @@ def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str
     assert first.shape == (360, 400, 3)
     np.testing.assert_array_equal(first, frame_of(renderer, batch), "the same moment looks the same")
     np.testing.assert_equal({**batch.state}, before)
+    saved = batch.save()
     for _ in range(3):
         batch.step(np.full(batch.action_shape, 0.25, np.float32))
     assert (frame_of(renderer, batch) != first).any()
     np.testing.assert_array_equal(first, kept, "frames are not overwritten")
     np.testing.assert_array_equal(frame_of(renderer, batch), frame_of(followed, batch), "also where one was left out")
+    batch.restore(saved)
+    np.testing.assert_array_equal(first, frame_of(renderer, batch), "trails end where the world goes back")
 
 
 def test_robots_and_slots_are_drawn_where_they_are() -> None:

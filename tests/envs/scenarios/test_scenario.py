@@ -95,6 +95,7 @@ def test_numbers_of_numpy_are_taken_as_python_s() -> None:
 
 def test_equal_sides_are_one_and_an_unknown_setting_is_a_wrong_argument() -> None:
     assert posse.get_scenario("search", arena=(20.0, 20.0)) == posse.get_scenario("search")
+    assert posse.get_scenario("field", outage_time=0.01).outage_steps == 1
     with pytest.raises(TypeError, match="unexpected keyword argument 'num_tracker'"):
         posse.get_scenario("smart", num_tracker=3)
 
