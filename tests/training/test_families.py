@@ -39,6 +39,8 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
     counts = [posse.family("obstacles", num_obstacles=(0, 3)).draw(k).num_obstacles for k in range(200)]
     assert set(counts) == {0, 1, 2, 3}
     assert len({OPEN.draw(0, seed, split).target_speed for seed in (0, 1) for split in ("train", "test")}) == 4
+    with pytest.raises(ScenarioError, match="unknown split 'tests'"):
+        OPEN.draw(0, split="tests")
 
 
 @pytest.mark.parametrize(
@@ -79,6 +81,8 @@ def test_teams_of_many_sizes_stand_side_by_side() -> None:
     assert sum(batch.num_worlds for batch in batches) == 64
     assert {batch.scenario.num_trackers for batch in batches} == {3, 4, 5, 6, 7}
     assert {batch.layout.size for batch in batches} == {batches[0].layout.size}
+    with pytest.raises(ScenarioError, match="scenarios=0 must be a whole number"):
+        posse.batches(sizes, 64, scenarios=0)
 
 
 def test_a_field_that_only_some_scenarios_have_is_refused(request: pytest.FixtureRequest) -> None:

@@ -42,10 +42,11 @@ def test_panels_stand_side_by_side_on_the_same_world(tmp_path: Path) -> None:
 def test_frames_may_be_left_out_and_a_film_may_begin_later(tmp_path: Path) -> None:
     settings: dict[str, Any] = {"seed": 3, "size": 200, "speed": 1.0}
     whole, times = read(film([PURSUIT], "smart", path=tmp_path / "a.gif", seconds=3.0, **settings))
-    part, longer = read(film([PURSUIT], "smart", path=tmp_path / "b.gif", seconds=2.0, start=1.0, every=5, **settings))
-    assert (len(whole), times[0]) == (31, 100)
-    assert (len(part), longer[0]) == (5, 500)
-    np.testing.assert_array_equal(part, whole[10::5])
+    part, longer = read(film([PURSUIT], "smart", path=tmp_path / "b.gif", seconds=2.0, start=1.0, every=6, **settings))
+    assert (len(whole), times[0], times[-1]) == (31, 100, 1500)
+    assert (len(part), longer[0]) == (5, 600)
+    np.testing.assert_array_equal(part, whole[[10, 16, 22, 28, 30]])
+    film([PURSUIT], "smart", path=tmp_path / "c.gif", seconds=0.01, scores=True)
     with pytest.raises(ValueError, match=r"every=1\.5 must be a whole number"):
         film([PURSUIT], "smart", path=tmp_path / "c.gif", every=1.5)  # type: ignore[arg-type]
 

@@ -7,7 +7,7 @@ import pytest
 import posse
 from posse_baselines import Trajectory
 from posse_training.reproduce.reproduce import MEMBERS, MODELS, reproduce
-from posse_training.reproduce.runs import Floats, draw_starts, settling_times
+from posse_training.reproduce.runs import Floats, draw_starts, median_world, settling_times
 
 
 def run_with(relative: Floats, speeds: Floats) -> Trajectory:
@@ -36,6 +36,7 @@ def test_settling_time_of_a_known_approach() -> None:
     # A team that still moves at the end has not settled.
     relative[:, 1, 0] = 0.05 * np.arange(81)
     assert np.isnan(settling_times(run_with(relative, still))[0])
+    assert [median_world(np.array(times)) for times in ([np.nan] * 2, [np.nan, 3.0, 1.0, 2.0])] == [0, 3]
 
 
 def test_starts_are_the_figures() -> None:

@@ -13,7 +13,7 @@ from tests.support.runs import killed_at, quiet
 from posse.numeric import FloatArray
 from posse_baselines import DDCS, Memory, tunables
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.fields import tuned
+from posse_baselines.fields import Tunable, tuned
 from posse_training.errors import RunFolderError
 from posse_training.tune import Space, TuneSettings, _Run, tune
 
@@ -99,6 +99,9 @@ def test_a_folder_of_another_run_or_damaged(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(RunFolderError, match=rf"cmaes='[0-9.]+', not '0', .*digest of {POLICY}='.*', not '0'"):
         tune(small(run), console=quiet())
     monkeypatch.undo()
+    (tmp_path / "tuned.json").touch()
+    with pytest.raises(RunFolderError, match=r"has tuned\.json, but no settings\.json"):
+        tune(small(tmp_path), console=quiet())
     (run / "state.json").write_text((run / "state.json").read_text()[:100])
     with pytest.raises(RunFolderError, match=r"state\.json is damaged"):
         tune(small(run), console=quiet())
@@ -108,6 +111,9 @@ def test_every_point_is_a_setting_that_can_be_played_and_the_start_is_the_defaul
     settings = FAMILY["ddcs-distributed"]
     found = tunables(settings)
     space = Space(found, [t.name for t in found])
+    narrow = Space((Tunable("a", 0.5, 1 / 3, 2 / 3, "", ""), Tunable("b", 0.5, 0.0, 2 / 3, "", "a")), ["a"])
+    assert narrow.values(np.zeros(1))["a"] == 1 / 3
+    assert narrow.values(np.ones(1))["b"] == 2 / 3
     rng = np.random.default_rng(1)
     for point in [*rng.random((200, len(found))), np.zeros(len(found)), np.ones(len(found))]:
         DDCS(settings).with_settings(**space.values(point))

@@ -1,19 +1,23 @@
 """Comparisons of teams, and all that plays against a given target."""
 
 import csv
+import io
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
+from rich.console import Console
 from tests.support.learned import policy_for, target_for
 
 import posse
 from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
-from posse_training import evaluate
+from posse_training import evaluate, film
 from posse_training.cli import main
 from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, CompareSettings, compare
@@ -108,7 +112,7 @@ def test_a_policy_that_cannot_play_is_left_out_with_a_line(
 ) -> None:
     monkeypatch.setitem(SCENARIOS, "few-beams", {"sonar_beams": 4})
     command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
-    options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
+    options = ["--episodes", "2", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
     assert main([*command, *options]) == 0
     assert "left out: any-0 on few-beams:" in " ".join(capsys.readouterr().out.split())
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -131,6 +135,17 @@ def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytes
             assert drawn == {"profile", "scenarios", *([] if changed else ["recovery"])}
     assert "NaN" not in (tmp_path / "none/summary.json").read_text(), "where the planner holds no slot"
     assert "planner" in capsys.readouterr().out
+
+
+def test_each_comparison_has_a_folder_and_each_contender_files_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    settings = CompareSettings(("a=idle", "A=pursuit", "[/a]=random"), ("constant", "constant"), 1, **ALONE)
+    for name in ("compare", "compare-2"):
+        found = compare(settings, console=Console(file=io.StringIO(), force_terminal=True))
+        assert found.folder.name == name
+    assert [row["files"] for row in found.rows] == [["constant-a.csv"], ["constant-A-2.csv"], ["constant-__a_.csv"]]
 
 
 def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> None:
@@ -190,14 +205,17 @@ def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: 
 def test_a_target_that_dies_while_it_is_imported_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "dying_target.py").write_text("import os\n\nos._exit(3)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
+    died = compare(CompareSettings(("idle", "dying_target:Own"), ("constant",), 2, out=tmp_path / "team", **ALONE))
+    assert ["exit code 3" in row["why"] for row in died.failed] == [True]
     settings = CompareSettings(("pursuit",), ("smart",), 2, out=tmp_path / "out", target="dying_target:Own", **ALONE)
     with pytest.raises(SettingsError, match=r"target='dying_target:Own' cannot be loaded: .* ended with exit code 3"):
         compare(settings)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_film_shows_the_target(file: Path, tmp_path: Path) -> None:
-    film = tmp_path / "film.gif"
-    asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--set", "num_trackers=3"]
-    watch.main([*asked, "--out", str(film), "--seconds", "0.3"])
-    assert film.is_file()
+def test_a_film_shows_the_target_and_the_whole_episode(file: Path, tmp_path: Path) -> None:
+    words = ["pursuit", "--target", str(file), "--set", "num_trackers=3", "--out", str(tmp_path / "film.gif")]
+    with patch.object(film, "film", side_effect=partial(film.film, every=300)) as asked:
+        watch.main(words)
+    assert (asked.call_args.kwargs["target"].name, asked.call_args.kwargs["seconds"]) == ("evading", 60.0)
+    assert (tmp_path / "film.gif").is_file()

@@ -9,6 +9,7 @@ import pytest
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.compare.compare import CompareSettings, compare
+from posse_training.parallel import apart
 
 BAD = "tests.support.bad_policies:"
 OPTIONS = ["--scenario", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
@@ -62,6 +63,10 @@ def test_a_policy_that_hangs_is_ended_and_so_is_a_thread_that_one_leaves(
     assert ["exceeded the time limit of 20 s" in row["why"] for row in found.failed] == [True]
     stat = Path("/proc", (tmp_path / "pid").read_text(), "stat")
     assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
+
+
+def test_what_a_policy_prints_is_no_part_of_the_answer() -> None:
+    assert apart(60.0, print, "hello") is None
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,7 @@ def test_scores_are_of_whole_episodes() -> None:
 
 
 def test_a_policy_that_does_not_say_so_is_not_given_the_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Idle, "watch", pytest.fail, raising=False)
+    monkeypatch.setattr(Idle, "watch", lambda *_: pytest.fail("it is given"), raising=False)
     evaluate("idle", "constant", 1, **FAST)
 
 
@@ -46,6 +46,9 @@ def test_the_interval_of_a_share_of_all_has_a_width(tmp_path: Path) -> None:
     assert "idle on constant: safe score 0.000 [0.000, 0.000], 10 episodes" in repr(results)
     for several in (share(np.ones((3, 40))), share(np.ones((1, 400)), block=10)):
         assert (several.low, several.high) == pytest.approx((40 / (40 + 1.96**2), 1), abs=1e-3)
+    assert share(np.arange(40) < 10, block=10).low >= 0
+    with pytest.raises(KeyError, match="unknown metric 'scor'; metrics are: score"):
+        results["scor"]
     with pytest.raises(SettingsError, match=r"must end in \.csv"):
         results.write(tmp_path / "all.json")
 
@@ -100,3 +103,5 @@ class TestTrainingSeeds:
             improvement([1, 2], [1, 2, 3])
         with pytest.raises(ValueError, match="numbers"):
             over_seeds([[np.nan, 1.0]])
+        with pytest.raises(ValueError, match="numbers"):
+            over_seeds([])

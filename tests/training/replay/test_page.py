@@ -100,5 +100,7 @@ def test_the_command_makes_the_same_page(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_what_no_command_makes_has_none() -> None:
     assert command(hostile()) == ""
+    assert command(record(["idle"], "smart", seconds=0.01, reward_weights={"slot": 2.0})) == ""
+    assert record(["idle"], "smart", seconds=0.01).players[0].frames == 2
     assert command(record(["idle"], "smart", target_speed=0.5, seconds=1)).endswith(" --set target_speed=0.5")
     assert command(short()).startswith("posse replay ddcs-distributed pursuit --scenario field ")

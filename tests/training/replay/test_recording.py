@@ -101,8 +101,10 @@ def test_contacts_are_told_with_who_touched_what() -> None:
     still, ahead, right_about = [-1, 0], [1, 0], [-1, 1]
     for speed, turn, steps in ((ahead, ahead, 8), (right_about, still, 16), (ahead, still, 40)):
         for _ in range(steps):
-            recorder.step(np.array([[speed, turn, still]], np.float32))
-    player = replay_of(recorder.trajectory(), "a").players[0]
+            recorder.step(np.array([[speed, turn, still]], np.float64))
+    played = recorder.trajectory()
+    assert played["actions"].dtype == np.float32
+    player = replay_of(played, "a").players[0]
     found = [event for event in player.events if event.kind == "contact"]
     assert [(event.robots, event.text) for event in found] == [
         ((0, 1), "contact: tracker 0 and tracker 1, with each other"),
@@ -153,3 +155,5 @@ def test_what_is_unknown_or_far_away_comes_back() -> None:
     values = np.array([[np.nan, -1000.0], [0.5, np.nan], [1000.0, 0.0]])
     back = decode(encode(Replay({"a": 1}, (Player("p", {"belief/a": values}),)))).players[0].columns["belief/a"]
     np.testing.assert_allclose(back, values, rtol=0, atol=resolution_of("belief/a", values) * 0.501)
+    with pytest.raises(ValueError, match="column 'step' is too great"):
+        encode(Replay({"a": 1}, (Player("p", {"step": np.full(2, 2.0**31)}),)))

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import torch
+from gymnasium.error import ResetNeeded
 from tensordict import TensorDictBase
 from torchrl.envs import SerialEnv
 from torchrl.envs.utils import check_env_specs
@@ -64,9 +65,9 @@ def test_the_state_and_discrete_actions() -> None:
 def test_steps_equal_those_of_the_batch() -> None:
     env = PosseEnv("field", WORLDS, seed=5)
     batch = posse.batch("field", WORLDS, seed=5, autoreset="disabled")
-    carried, expected = env.reset(), batch.reset()
-    np.testing.assert_array_equal(carried["agents", "observation"].numpy(), expected)
-    assert not carried["score"].any()
+    first, expected = env.reset(), batch.reset()
+    np.testing.assert_array_equal(first["agents", "observation"].numpy(), expected)
+    carried = first
     for actions in some_actions(batch.action_shape, 40):
         observations, rewards, terminated, truncated, infos = batch.step(actions)
         following, carried = env.step_and_maybe_reset(act(carried, actions))
@@ -76,6 +77,8 @@ def test_steps_equal_those_of_the_batch() -> None:
         np.testing.assert_array_equal(now["terminated"].squeeze(-1).numpy(), terminated)
         np.testing.assert_array_equal(now["truncated"].squeeze(-1).numpy(), truncated)
         np.testing.assert_array_equal(now["score"].squeeze(-1).numpy(), infos["score"])
+    env.batch.arrays.world["score"] = 0.5
+    assert not first["score"].any()
 
 
 def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
@@ -83,6 +86,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     batch = posse.batch("smart", WORLDS, seed=5, autoreset="disabled", **SHORT)
     guard = Guard(batch.layout, WORLDS)
     carried, seen = env.reset(), batch.reset()
+    carried["agents", "observation"].zero_()  # as below
     for wanted in some_actions(batch.action_shape, 30):
         seen, _, _, truncated, _ = batch.step(guard.actions(seen, wanted))
         following, carried = env.step_and_maybe_reset(act(carried, wanted))
@@ -92,6 +96,8 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
             seen = batch.reset(options={"reset_mask": truncated})
             guard.restart(truncated)
     check_env_specs(env, seed=1)
+    with pytest.raises(ResetNeeded):
+        PosseEnv("smart", WORLDS, safeguard=True).step(act(carried, wanted))
     with pytest.raises(PolicyError, match="discrete actions are no velocities"):
         PosseEnv("smart", WORLDS, safeguard=True, discrete_actions=True)
 
@@ -107,6 +113,13 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     assert torch.equal(after[~marks], before[~marks])
     assert (after[marks] != before[marks]).flatten(1).any(1).all()
     assert env.batch.arrays.world["episode"].tolist() == [0, 1, 0, 1, 1, 0]
+
+
+def test_a_seed_is_of_the_next_reset_alone() -> None:
+    env = PosseEnv("constant", 1)
+    env.set_seed(3)
+    starts = [env.reset()["agents", "observation"] for _ in range(2)]
+    assert (starts[0] != starts[1]).any()
 
 
 def test_the_ends_of_episodes_reach_serial_environments() -> None:

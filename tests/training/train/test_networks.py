@@ -44,6 +44,15 @@ def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
     assert not np.array_equal(means[0], means[-1])
 
 
+def test_statistics_forget_and_leave_out_what_does_not_vary() -> None:
+    statistics = RunningStatistics(1)
+    statistics.add(np.ones((4, 1), np.float32))
+    assert statistics.scale == 0
+    statistics.count = 5e6
+    statistics.add(np.ones((4, 1), np.float32))
+    assert statistics.count == 2e6
+
+
 @pytest.mark.parametrize("hidden", [(8,), ()])
 def test_the_state_changes_values_but_no_actions(tmp_path: Path, hidden: tuple[int, ...]) -> None:
     settings = small(tmp_path, "mappo", hidden=hidden)

@@ -111,6 +111,9 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
             assert infos[5 * e]["TimeLimit.truncated"] is True
             assert ("episode" in infos[5 * e]) == ("metrics" in infos[5 * e]) == (step >= HORIZON)
     assert ends == [[*range((e + 1) * HORIZON // 4, 4 * HORIZON + 1, HORIZON)] for e in range(4)]
+    many = make(worlds=2 * HORIZON, staggered=True)
+    many.reset()
+    assert many.step(draw(many, generator))[2][::5].tolist() == [True] * 3 + [False] * (2 * HORIZON - 3)
 
 
 def test_teams_of_several_sizes_and_scenarios() -> None:

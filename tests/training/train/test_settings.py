@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import json
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from tests.support.runs import resume
 
 import posse
 from posse.declarations import FIELDS
+from posse_training import provenance
 from posse_training.errors import SettingsError
 from posse_training.train import TrainSettings, default_settings
 from posse_training.train.algorithms import ALGORITHMS
@@ -48,12 +50,21 @@ def test_a_run_holds_the_code_of_its_rules(tmp_path: Path, monkeypatch: pytest.M
     assert "digest of gauges:rules" not in TrainSettings(scenario="constant").held()
 
 
+def test_the_commit_is_not_that_of_another_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words in ("init -q", "-c user.name=a -c user.email=a@b.c commit -q --allow-empty -m one"):
+        subprocess.run(["git", *words.split()], cwd=tmp_path, check=True)
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "provenance.py"))
+    assert provenance.commit() is None
+
+
 @pytest.mark.parametrize(
     "text",
     [
         "{",
         "[]",
         '{"steps": NaN}',
+        '{"steps": true}',
+        '{"log_deviation": -1, "final_log_deviation": 0}',
         '{"side": "neither"}',
         '{"overrides": [1]}',
         '{"hidden": {"a": 1}}',

@@ -82,7 +82,9 @@ def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path, monkeypatch
         usual(self)
 
     monkeypatch.setattr(PPO, "train", note)
-    train(small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0), console=quiet())
+    threads = torch.get_num_threads()
+    train(small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0, threads=threads + 1), console=quiet())
+    assert torch.get_num_threads() == threads, "as before"
     assert len(deviations) == 8
     for k, deviation in enumerate(deviations):
         assert deviation == pytest.approx(-1.0 - 2.0 * k / 8, abs=0.02)
