@@ -100,19 +100,14 @@ def test_the_sides_are_not_mixed_up(tmp_path: Path) -> None:
         play(posse.Batch(SHORT.replace(target_motion="agent"), 1), load("pursuit"))
 
 
-def results(target: str) -> dict[str, float]:
-    team = load("ddcs-tuned")
-    batch = batch_for(team, "duel", 40, load_target(target), seed=3, split="test")
-    return {name: float(values.mean()) for name, values in play(batch, team).items()}
-
-
 @pytest.mark.long
 def test_no_open_loop_target_costs_the_tuned_script_more_than_a_tenth() -> None:
-    own = results("smart")["safe_score"]
-    for name in ("constant", *OPEN_LOOP):
-        found = results(name)
-        assert found["safe_score"] > own - 0.1, name
-        assert found["contact_free"] > 0.97, name
+    team, scores = load("ddcs-tuned"), {}
+    for name in ("smart", "constant", *OPEN_LOOP):
+        found = play(batch_for(team, "duel", 40, load_target(name), seed=3, split="test"), team)
+        scores[name] = found["safe_score"].mean()
+        assert name == "smart" or found["contact_free"].mean() > 0.97, name
+    assert min(scores.values()) > scores["smart"] - 0.1, scores
 
 
 def test_an_open_loop_target_restarts_with_its_world() -> None:

@@ -10,10 +10,10 @@ from tests.support.runs import GUARDED, quiet, resume, small, steps_saved
 
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
-from posse_training.errors import RunFolderError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.train import train as module
-from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.algorithms import ALGORITHMS, even_minibatch
 from posse_training.train.train import steps_made, train
 from posse_training.train.worlds import make_env
 
@@ -53,6 +53,9 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     assert schedule(0.5) == pytest.approx(5.5e-4)
     assert schedule(0.0) == pytest.approx(schedule(-7.0)) == pytest.approx(1e-4)
     assert steps_made(settings, env.num_envs) == env.num_envs * settings.rollout > 100
+    assert [even_minibatch(rows, 2) for rows in (7, 12, 15)] == [7, 2, 3]
+    with pytest.raises(SettingsError, match="1 row is too short to learn from"):
+        even_minibatch(1, 2)
 
 
 def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
