@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.learned import policy_for
 from tests.support.replays import hostile, short
 
+import posse
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import Event, Player, Replay, read_replay, record, write_replay
@@ -101,6 +103,8 @@ def test_the_command_makes_the_same_page(tmp_path: Path, monkeypatch: pytest.Mon
 def test_what_no_command_makes_has_none() -> None:
     assert command(hostile()) == ""
     assert command(record(["idle"], "smart", seconds=0.01, reward_weights={"slot": 2.0})) == ""
-    assert record(["idle"], "smart", seconds=0.01).players[0].frames == 2
+    team = policy_for(posse.batch("smart").layout).with_card({"name": "mine", "check": {"seed": 1}, "seed": 2})
+    player = record([team], "smart", seconds=0.01).players[0]
+    assert (player.frames, player.about) == (2, {"name": "mine", "seed": 2})
     assert command(record(["idle"], "smart", target_speed=0.5, seconds=1)).endswith(" --set target_speed=0.5")
     assert command(short()).startswith("posse replay ddcs-distributed pursuit --scenario field ")

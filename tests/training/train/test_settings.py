@@ -27,16 +27,11 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "side", "algorithm"),
-    [
-        ("search", "trackers", "cmaes"),
-        ("search, field", "trackers", "cmaes"),
-        ("search,smart", "trackers", "ppo"),
-        ("search", "target", "ppo"),
-    ],
+    ("scenario", "algorithm"), [("search", "cmaes"), ("search, field", "cmaes"), ("search,smart", "ppo")]
 )
-def test_the_scenario_decides_on_the_algorithm(scenario: str, side: str, algorithm: str) -> None:
-    assert default_settings(scenario, side=side).algorithm == algorithm
+def test_the_scenario_decides_on_the_algorithm(scenario: str, algorithm: str) -> None:
+    assert default_settings(scenario).algorithm == algorithm
+    assert default_settings(scenario, side="target").algorithm == "ppo"
 
 
 def test_a_run_holds_the_code_of_its_rules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
