@@ -84,7 +84,7 @@ class BasePolicy:
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the memory as arrays (E, ...) by name; views, not copies. PolicyError if it is of an unknown kind."""
-        if isinstance(memory, ObservationLayout):  # that of :meth:`begin` here: nothing is remembered
+        if memory is None or isinstance(memory, ObservationLayout):  # as of :meth:`begin` here: nothing is remembered
             return {}
         if not hasattr(memory, "arrays"):
             raise PolicyError(f"the memory of policy {self.name!r} cannot be saved: define its method arrays(memory)")

@@ -167,15 +167,16 @@ class Encoder(OwnArrays):
         features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
         works = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(self._known.slots))
         # The threads share out rows as if each were a world of one tracker.
-        over_worlds(_write_all, (rows, self._known, estimates.reshape(-1), features, works), len(rows), 1)
+        over_worlds(_write_all, (rows, (self._known, *works), estimates.reshape(-1), features), len(rows), 1)
         self.estimates[worlds] = estimates
         return np.hstack([features.view(np.float32).reshape(len(rows), -1), read])
 
 
 @kernel
 def _write_all(
-    rows: FloatArray, known: Known, estimates: Records, features: Records, works: Any, thread: int, first: int, end: int
+    rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
 ) -> None:
-    places, work = works[0][thread], work_of(works[1], thread)
+    known, places, works = given
+    work = work_of(works, thread)
     for r in range(first, end):
-        write_features(rows[r], known, estimates[r], places, work, features[r])
+        write_features(rows[r], known, estimates[r], places[thread], work, features[r])

@@ -57,7 +57,8 @@ class Teams(NamedTuple):
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
     """Write actions (E, rows, 2 + m) for the trackers of those worlds that are ``going`` (E,)."""
     robots = batch.scenario.num_trackers
-    over_worlds(drive_all, (teams, work_for(robots), batch.arrays, going, actions), batch.num_worlds, robots)
+    given = teams, work_for(robots)
+    over_worlds(drive_all, (given, batch.arrays, going, actions), batch.num_worlds, robots)
 
 
 @compiled
@@ -156,9 +157,10 @@ def drive_team(teams: Teams, worlds: Any, e: int, work: Work, actions: FloatArra
 
 @kernel
 def drive_all(
-    teams: Teams, works: Work, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
+    given: Any, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
     """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
+    teams, works = given
     work = work_of(works, thread)
     for e in range(first, end):
         if going[e]:

@@ -17,7 +17,7 @@ import posse
 from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import LearnedPolicy
-from posse_training import evaluate, film
+from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, CompareSettings, compare
@@ -26,6 +26,7 @@ from posse_training.compare.table import ranked
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation.statistics import difference
 from posse_training.files import locked
+from posse_training.film import film
 from posse_training.leaderboard import submit
 
 ALONE: dict[str, Any] = {"figures": False, "planner_episodes": 0}
@@ -215,7 +216,7 @@ def test_a_target_that_dies_while_it_is_imported_is_named(tmp_path: Path, monkey
 
 def test_a_film_shows_the_target_and_the_whole_episode(file: Path, tmp_path: Path) -> None:
     words = ["pursuit", "--target", str(file), "--set", "num_trackers=3", "--out", str(tmp_path / "film.gif")]
-    with patch.object(film, "film", side_effect=partial(film.film, every=300)) as asked:
+    with patch.object(watch, "film", side_effect=partial(film, every=300)) as asked:
         watch.main(words)
     assert (asked.call_args.kwargs["target"].name, asked.call_args.kwargs["seconds"]) == ("evading", 60.0)
     assert (tmp_path / "film.gif").is_file()

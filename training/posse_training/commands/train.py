@@ -14,7 +14,7 @@ from rich.console import Console
 
 from posse import family_names
 from posse.declarations import users_modules
-from posse_training.errors import ClusterError, SettingsError, require
+from posse_training.errors import ClusterError, RunFolderError, SettingsError, require
 from posse_training.files import check_held
 from posse_training.options import Names, Ray, words_of
 from posse_training.parallel import all_on_ray, connected
@@ -91,10 +91,18 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
     for settings in runs:
         check_before(settings)
         check_held(settings.run_folder / SETTINGS, settings.held(), FREE)
-    if ray is False:
-        return [train(settings) for settings in runs]
-    with connected(ray, log=True):
-        return all_on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs])
+    if ray is not False:
+        with connected(ray, log=True):
+            return all_on_ray(train_on_worker, [(settings, Path.cwd()) for settings in runs])
+    paths, failed = [], []
+    for settings in runs:
+        try:
+            paths.append(train(settings))
+        except RunFolderError as error:  # such as networks that diverge: other seeds are trained nevertheless
+            failed.append(RunFolderError(f"seed {settings.seed}: {error}"))
+    if failed:
+        raise failed[0]
+    return paths
 
 
 def train_on_worker(settings: TrainSettings, where: Path) -> Path:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from posse import Family
 from posse_training.errors import SettingsError
 from posse_training.train.settings import TrainSettings
 
@@ -181,6 +182,13 @@ def check_read(settings: TrainSettings, default: TrainSettings) -> None:
         for each in _READ_BY[group].split():
             if (value := getattr(settings, each)) != getattr(default, each):
                 raise SettingsError(f"{each}={value!r} is for {group}, not {name}: leave it out, or change algorithm")
+    families = any(isinstance(given, Family) for given in settings.given)
+    for each, read, what in (
+        ("imitate_rounds", settings.imitate is not None, "--imitate"),
+        ("family_scenarios", families, "families of scenarios"),
+    ):
+        if not read and (value := getattr(settings, each)) != getattr(default, each):
+            raise SettingsError(f"{each}={value!r} is for {what}: leave it out")
 
 
 def even_minibatch(rows: int, wanted: int) -> int:
