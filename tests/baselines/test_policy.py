@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.adapters import out_of_band
+from tests.support.attack import out_of_band
 from tests.support.learned import policy_for
 
 import posse

@@ -8,11 +8,21 @@ import numpy.typing as npt
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.support.reference.motion import free_gaps, free_motion, path_gaps
 from tests.support.reference.observation import observation
 from tests.support.reference.score import Episode, slots
 from tests.support.reference.senses import Senses
-from tests.support.reference.state import NAMES, State, headings, one_world, positions, snapshot, working
+from tests.support.reference.state import (
+    NAMES,
+    State,
+    free_gaps,
+    free_motion,
+    headings,
+    one_world,
+    path_gaps,
+    positions,
+    snapshot,
+    working,
+)
 
 import posse
 from posse.declarations import TARGET_MOTIONS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from tests.support.reference.motion import on_arc
+from tests.support.reference.state import on_arc
 
 from posse_baselines.ddcs.memory import record
 from posse_baselines.laws import formation, guidance

@@ -11,8 +11,7 @@ from gymnasium.error import ResetNeeded
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
-from tests.support.adapters import out_of_band, same
-from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
+from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject, out_of_band, same
 
 from posse import REWARD_TERMS, parallel_env
 

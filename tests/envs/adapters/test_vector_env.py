@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from tests.support.adapters import same
+from tests.support.attack import same
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from gymnasium.error import ResetNeeded
-from tests.support.adapters import out_of_band, same
+from tests.support.attack import out_of_band, same
 from tests.support.process import printed
 from tests.support.reference.state import snapshot
 

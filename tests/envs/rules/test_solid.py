@@ -12,8 +12,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from tests.envs.test_random_worlds import SETTINGS, started
-from tests.support.reference.motion import on_arc
-from tests.support.reference.state import Complexes, directions, one_world, points, positions, snapshot
+from tests.support.reference.state import Complexes, directions, on_arc, one_world, points, positions, snapshot
 
 import posse
 from posse.rules import arc

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import stats
-from tests.support.reference.motion import free_gaps
-from tests.support.reference.state import directions, obstacles, one_world, points, positions, snapshot
+from tests.support.reference.state import directions, free_gaps, obstacles, one_world, points, positions, snapshot
 
 import posse
 

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from tests.support.reference.motion import free_gaps
 from tests.support.reference.senses import Senses, sonar
-from tests.support.reference.state import TOUCHING, Array, State, headings, positions, working
+from tests.support.reference.state import TOUCHING, Array, State, free_gaps, headings, positions, working
 
 import posse
 from posse.scenarios.scenario import FORMATIONS

@@ -6,9 +6,8 @@ from collections import defaultdict
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import connected_components
-from tests.support.reference.motion import free_gaps
 from tests.support.reference.senses import can_see, radio_alive
-from tests.support.reference.state import TOUCHING, Array, Complexes, State, positions, working
+from tests.support.reference.state import TOUCHING, Array, Complexes, State, free_gaps, positions, working
 
 import posse
 
