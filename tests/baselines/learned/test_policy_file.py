@@ -1,5 +1,6 @@
-"""Policy files give back the policy; other and damaged ones are refused by name, and reading one runs no code."""
+"""Policy files give back the policy, damaged ones are refused, reading runs no code; files are written as a whole."""
 
+import errno
 import json
 import sys
 import tempfile
@@ -15,6 +16,7 @@ from tests.support.learned import observations_of, policy_for
 
 import posse
 from posse_baselines import Policy, PolicyError, load
+from posse_baselines.files import remove_unfinished, replacing, write_atomically
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy import write_policy_file
 
@@ -140,3 +142,30 @@ def test_descriptions_that_lack_something_or_are_of_another_kind(tmp_path: Path,
         write_policy_file(path, TENSORS, description)
         with pytest.raises(PolicyError, match="damaged"):
             LearnedPolicy.from_file(path)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.ENOSPC, "the disk is full")])
+def test_an_error_while_writing_leaves_the_old_file_alone(tmp_path: Path, error: BaseException) -> None:
+    path = tmp_path / "file.txt"
+    write_atomically(path, b"old")
+
+    def write_half() -> None:
+        with replacing(path) as partial:
+            partial.write_bytes(b"half")
+            raise error
+
+    with pytest.raises(type(error)) as caught:
+        write_half()
+    assert str(caught.value) in ("", f"[Errno {errno.ENOSPC}] the disk is full: {str(path)!r}")
+    assert path.read_bytes() == b"old"
+    with pytest.raises(IsADirectoryError, match=f"directory: {str(tmp_path)!r}$"):
+        write_atomically(tmp_path, b"new")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_writer_left_is_removed(tmp_path: Path) -> None:
+    kept = tmp_path / ".posse-notes"
+    kept.touch()
+    (tmp_path / f".posse-{'0123456789abcdef'}.safetensors").write_bytes(b"half")
+    remove_unfinished(tmp_path)
+    assert list(tmp_path.iterdir()) == [kept]

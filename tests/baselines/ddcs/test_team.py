@@ -1,0 +1,206 @@
+"""A team's settings, and the whole team at play: slots, search, obstacles, late commands, drift; what it refuses."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.drive import drive
+
+import posse
+from posse.numeric import FloatArray
+from posse_baselines import DDCS, PolicyError, begin, load, play, rollout, tunables
+from posse_baselines.ddcs import SEARCHING, Settings
+from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.policy import Memory
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"model": "central"}, "model='central' is unknown; known: distributed, centralized"),
+        ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
+        ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
+        ({"radio": "no"}, "radio='no' must be True or False"),
+        ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
+        ({"forbidden": ("flocking>flocking",)}, "forbidden='flocking>flocking' is unknown"),
+    ],
+)
+def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Settings(**setting)
+
+
+def test_a_changed_policy_is_of_the_same_kind() -> None:
+    policy: Any = load("belief-planner")
+    changed = policy.with_settings(near=0.5)
+    assert (type(changed), changed.settings_for(posse.get_scenario("smart")).near) == (type(policy), 0.5)
+    with pytest.raises(ValueError, match=r"unknown setting 'alpha'.*did you mean 'alpha_2'"):
+        policy.with_settings(alpha=1.0)
+
+
+def test_both_ends_of_each_range_can_be_played() -> None:
+    batch = posse.batch("field", 2, message_size=5, horizon=40)
+    for end in ("low", "high"):
+        values = {t.name: getattr(t, end) for t in tunables(FAMILY["pngl-l-phi"])}
+        values |= {"near": 0.1, "far": 4.0, "range_near": 0.1, "range_far": 4.0}
+        assert np.isfinite(play(batch, DDCS(FAMILY["pngl-l-phi"]).with_settings(**values))["score"]).all()
+
+
+@pytest.mark.parametrize("scenario", ["smart", "field"])
+@pytest.mark.parametrize("name", ["pngl-l-phi", "ddcs-distributed"])
+def test_small_robots_do_in_a_small_world_what_large_ones_do_in_a_large_one(scenario: str, name: str) -> None:
+    policy, share = load(name), 0.4
+    large = posse.get_scenario(scenario, message_size=policy.message_size)
+    lengths = {
+        key: np.asarray(v) * share for key, v in large.to_dict().items() if large.settings()[key].unit[:1] == "m"
+    }
+    small = large.replace(**{key: v.tolist() for key, v in lengths.items() if key != "odometry_drift"})
+    batch = posse.batch(large, 3, seed=3)
+    layout = posse.ObservationLayout(small)
+    observations, memory, of_small = batch.reset(), begin(policy, batch), policy.begin(layout, 3)
+    for _ in range(200):
+        shrunk = observations.copy()
+        for field in layout.fields:
+            layout.views(shrunk)[field.name][...] *= share if field.unit in ("m", "m/s") else 1.0
+        actions, memory = policy.act(observations, memory)
+        same, of_small = policy.act(shrunk, of_small)
+        np.testing.assert_allclose(same, actions, atol=1e-4)
+        observations = batch.step(actions)[0]
+    estimate, other = (policy.annotations(m)["estimate"][..., :2] for m in (memory, of_small))
+    np.testing.assert_allclose(other, estimate * share, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("worlds", "settings"),
+    [
+        (40, {"formation": "ring", "num_trackers": 6}),
+        (40, {"formation": "rows", "num_trackers": 9}),
+        (40, {"radio_loss": 0.3, "radio_delay": 2}),
+        (40, {"num_trackers": 8, "formation": "ring", "num_neighbours": 3}),
+        # Team-mates that are no longer in the observation must not stay as obstacles where they were.
+        (4, {"num_trackers": 40, "num_neighbours": 8, "formation": "rows"}),
+    ],
+)
+def test_trackers_end_in_slots_of_their_own(worlds: int, settings: dict[str, Any]) -> None:
+    batch = posse.batch("constant", worlds, split="train", message_size=5, **settings)
+    metrics = play(batch, load("ddcs-distributed"))
+    assert np.isfinite(metrics["settling_time"]).mean() >= 0.95
+    assert metrics["score"].mean() >= 0.85 * metrics["bound"].mean()
+
+
+@pytest.mark.parametrize("name", sorted({*FAMILY} - {"velocity-pursuit", "ddcs-no-radio"}))
+def test_every_member_of_the_family_settles_on_a_straight_target(name: str) -> None:
+    batch = posse.batch("constant", 40, split="train", message_size=5)
+    metrics = play(batch, load(name))
+    assert np.isfinite(metrics["settling_time"]).mean() >= 0.9
+    assert (metrics["tracker_contacts"] + metrics["target_contacts"] == 0).mean() >= 0.9
+
+
+@pytest.mark.parametrize("neighbours", [4, 1])
+def test_obstacles_are_kept_off(neighbours: int) -> None:
+    batch = posse.batch("obstacles", 60, split="train", message_size=5, num_neighbours=neighbours)
+    metrics = play(batch, load("ddcs-distributed"))
+    assert (metrics["obstacle_contacts"] == 0).mean() >= 0.95
+    assert (metrics["tracker_contacts"] == 0).mean() >= 0.95
+
+
+def test_a_rectangle_is_searched_as_fast_as_a_square_of_its_area() -> None:
+    make: dict[str, Any] = {"seed": 4, "split": "train", "message_size": 5, "horizon": 300}
+    batches = [posse.batch("search", 80, arena=arena, **make) for arena in (20.0, (28.0, 14.0))]
+    found = [play(batch, load("ddcs-distributed"))["detection_time"] for batch in batches]
+    square, rectangle = np.nan_to_num(found, nan=30.0)
+    assert rectangle.max() < 30.0, "found in every world"
+    assert rectangle.mean() < square.mean() + 1.0
+
+
+LATE, DRIFTING = {"actuator_lag": 0.5, "command_delay": 3}, {"odometry_drift": 0.05, "heading_drift": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"), [("pngl-l-phi", LATE), ("ddcs-distributed", LATE), ("pngl-l-phi", DRIFTING)]
+)
+def test_late_commands_and_drifting_poses_cost_the_team_little(name: str, fault: dict[str, Any]) -> None:
+    policy = load(name)
+    metrics = play(posse.batch("constant", 60, split="train", message_size=policy.message_size, **fault), policy)
+    assert metrics["safe_score"].mean() >= 0.75
+    assert (metrics["contact_free"] == 0).mean() <= 0.02
+
+
+class Blinded(DDCS):
+    """A team whose sensors fail after 40 s."""
+
+    steps = 0
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        self.steps += 1
+        seen = observations.copy()
+        if self.steps > 400:
+            views = memory.layout.views(seen)
+            views["target_known"][...], views["target_seen"][...] = 0.0, 0.0
+        return super().act(seen, memory)
+
+
+def test_on_the_open_plane_a_lost_target_is_searched_for_where_it_was_lost() -> None:
+    pose: dict[str, Any] = {"tracker_pose": [(5.0, 0.0, 0.0)], "target_pose": (8.0, 0.0, 0.0), "num_trackers": 1}
+    run = drive(Blinded(), "constant", 1, 1000, **pose)
+    places = np.array([now.tracker[0, 0, :2] for now in run if (now.notes["task"] == SEARCHING).all()])
+    assert len(places) > 400
+    assert places[0, 0] > 25.0
+    assert np.hypot(*(places - places[0]).T).max() < 15.0
+
+
+def test_late_fixes_are_extrapolated_to_the_present() -> None:
+    settings: dict[str, Any] = {"radio_delay": 8, "sensing_range": 2.5, "start_distance": (2.0, 3.0)}
+    batch = posse.batch("accelerating", 20, message_size=5, autoreset="disabled", split="train", **settings)
+    played = rollout(batch, load("ddcs-distributed"), ["observations", "annotations", "target_pose"], steps=150)
+    v, late = batch.layout.views(played["observations"][:-1]), slice(51, None)
+    counts = (v["target_age"] > 0.5) & (v["target_age"] < 1.5)
+    position, heading, bearing = (v[name] @ [1, 1j] for name in ("position", "heading", "target_bearing"))
+    target = played["target_pose"][:-1, :, None, :2] @ [1, 1j]
+    estimated = np.abs(played["annotation/estimate"][..., :2] @ [1, 1j] - target)[late][counts[late]]
+    fixed = np.abs(position + v["target_range"] * bearing * heading - target)[late][counts[late]]
+    assert fixed.size > 100
+    assert estimated.mean() < 0.3 * fixed.mean()
+
+
+def test_claims_that_name_no_robot_or_slot_of_the_team_are_none() -> None:
+    policy, batch = load("pngl-l-phi"), posse.batch(message_size=5)
+    observations = batch.reset()
+    batch.layout.views(observations)["neighbour_message"][...] = 0.6
+    _, memory = policy.act(observations, begin(policy, batch))
+    assert memory.mates["leader"].max() == memory.mates["slot"].max() == -1
+
+
+@pytest.mark.parametrize("field", ["number", "neighbour_number"])
+def test_numbers_of_no_tracker_are_refused(field: str) -> None:
+    policy, batch = load("ddcs-distributed"), posse.batch(message_size=5)
+    batch.layout.views(observations := batch.reset())[field][...] = 7.0
+    with pytest.raises(ValueError, match="observations that are no scenario's"):
+        policy.act(observations, begin(policy, batch))
+
+
+def test_delays_that_are_not_foreseen_are_refused() -> None:
+    policy = load("pngl")
+    begin(policy, posse.batch(message_size=5, command_delay=10))
+    with pytest.raises(PolicyError, match="command_delay=11, but at most 10"):
+        begin(policy, posse.batch(message_size=5, command_delay=11))
+
+
+@pytest.mark.parametrize(("name", "least"), [("ddcs-distributed", 0.8), ("learned-smart", 0.68)])
+def test_unequal_robots_agree_on_the_turn_of_the_slots(name: str, least: float) -> None:
+    """The slowest one limits it; at the own speed of the others it would be six times as fast."""
+    batch = posse.batch("accelerating", 40, message_size=5, tracker_speed=(0.7, 1.5, 1.5, 1.5, 1.5))
+    assert play(batch, load(name))["score"].mean() > least
+
+
+def test_noise_of_the_headings_is_filtered() -> None:
+    noise, errors = 0.1, {}
+    for trust in (1.0, 0.1):
+        policy = DDCS(FAMILY["ddcs-distributed"]).with_settings(heading_trust=trust)
+        batch = posse.batch("smart", 20, message_size=5, autoreset="disabled", split="train", heading_noise=noise)
+        played = rollout(batch, policy, ["annotations", "target_pose"], steps=120)
+        wrong = played["annotation/estimate"][61:, ..., 2] - played["target_pose"][61:-1, :, None, 2]
+        errors[trust] = np.std(np.angle(np.exp(1j * wrong)))
+    assert errors[1.0] == pytest.approx(noise, rel=0.1, abs=0.005)
+    assert errors[0.1] <= 0.5 * noise
