@@ -1,23 +1,32 @@
-"""The manual: it documents every public name, finds them, loads nothing from elsewhere, and fits a phone."""
+"""The manual: it documents every public name, loads nothing from elsewhere, fits a phone; and what its pages show."""
 
+import dataclasses
 import fcntl
 import functools
 import html
 import http.server
 import importlib
+import json
 import os
 import re
+import runpy
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 from tests.support.browser import chromium
-from tests.support.pages import ROOT
-from tests.support.process import printed
+from tests.support.process import ROOT, printed
 
 import posse
+from posse_baselines import batch_for, load, play, policy_names
+from posse_training.leaderboard import Standing, standings_text
 
 DOCS = ROOT / "docs"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SCENARIOS = (DOCS / "scenarios.md").read_text(encoding="utf-8")
 MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay", "posse_training.leaderboard")
 
 
@@ -94,3 +103,75 @@ def test_pages_fit_are_short_and_ask_no_other_host(site: Path, width: int, scree
         assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
         assert failed == []
         assert faults == []
+
+
+def test_every_policy_and_scenario_is_in_the_manual() -> None:
+    page = (DOCS / "policies.md").read_text(encoding="utf-8")
+    assert [name for name in policy_names() if f"`{name}`" not in page] == []
+    heads = [line for line in SCENARIOS.splitlines() if line.startswith("### ")]
+    assert [name for name in posse.scenario_names() if not re.search(rf"\b{name}\b", "\n".join(heads))] == []
+
+
+def test_the_loop_plays_an_episode(capsys: pytest.CaptureFixture[str]) -> None:
+    runpy.run_path(str(DOCS / "tutorials" / "step_loop.py"))
+    policy = load("ddcs-distributed")
+    assert float(capsys.readouterr().out) == play(batch_for(policy, "smart", seed=1), policy)["safe_score"][0]
+
+
+@pytest.mark.long
+def test_the_notebook_runs(tmp_path: Path) -> None:
+    pytest.importorskip("nbclient", reason="no nbclient: pip install '.[docs]'")
+    out = tmp_path / "out.ipynb"
+    short = {"POSSE_NOTEBOOK_STEPS": "1000", "POSSE_NOTEBOOK_EPISODES": "2"}
+    homes = dict.fromkeys(("IPYTHONDIR", "JUPYTER_RUNTIME_DIR"), str(tmp_path))
+    printed(DOCS / "drawing" / "notebook.py", "--out", out, **short, **homes)
+    cells = json.loads(out.read_text(encoding="utf-8"))["cells"]
+    text = [json.dumps(cell.get("outputs", "")) for cell in cells]
+    assert sum("<iframe srcdoc" in outputs for outputs in text) == 2
+    compared = next(outputs for outputs in text if "pngl-l-phi  " in outputs)
+    assert "smart-ppo-1" in compared
+
+
+@pytest.mark.long
+def test_the_speed_benchmark_measures(tmp_path: Path) -> None:
+    printed(ROOT / "benchmarks" / "speed.py", "--worlds", "2", "--no-cold", "--seconds", "0.01", cwd=tmp_path)
+    figures = json.loads((tmp_path / "runs" / "bench" / "speed.json").read_text(encoding="utf-8"))
+    assert {"machine", "batches", "one_world"} <= figures.keys()
+
+
+ROW = Standing("a team", "a.b:C", False, "smart", 1, 2026, 1000, 0.5, 0.4, 0.6, 0.7, 0.75, "932670c6b288")
+
+
+@pytest.fixture
+def hook(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    """Import a module of the manual's."""
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
+    for folder in ("drawing", "hooks"):
+        monkeypatch.syspath_prepend(str(DOCS / folder))
+    return importlib.import_module
+
+
+def test_the_table_of_the_readme_is_made_from_the_result_files(hook: Callable[[str], ModuleType]) -> None:
+    assert hook("readme_table").with_table(README) == README
+
+
+def test_teams_are_ranked_by_the_safe_score(
+    hook: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the present version and enough worlds."""
+    rows: list[dict[str, Any]] = [
+        {"label": "third", "safe_score": 0.45},
+        {"label": "first", "safe_score": 0.55, "seed": 7},
+        {"label": "second"},
+        {"label": "knows", "safe_score": 0.6, "reads_state": True, "worlds": 100},
+        {"label": "slow", "safe_score": 0.58, "policy": "belief-planner", "worlds": 100},
+        *({"label": "unlisted", **change} for change in ({"version": 99}, {"worlds": 999})),
+    ]
+    path, standings = tmp_path / "standings.csv", hook("standings")
+    path.write_text(standings_text([dataclasses.replace(ROW, **row) for row in rows]), encoding="utf-8")
+    monkeypatch.setattr(standings, "STANDINGS", path)
+    table = standings.leaderboard().split("### smart\n")[1].split("###")[0]
+    rows_of = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("|")]
+    listed = [[cell.strip() for cell in row] for row in rows_of[2:]]
+    assert [row[0] for row in listed] == ["", "", "1", "2", "3"]
+    assert [row[1] for row in listed] == ["knows (reference)", "slow (reference)", "first", "second", "third"]
