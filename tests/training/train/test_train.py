@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,14 @@ from tests.support.runs import AGAINST, GUARDED, TARGET, killed_at, numbers, qui
 
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
+from posse_training.commands.train import train_all
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.files import locked
 from posse_training.train import checkpoint
 from posse_training.train import train as module
 from posse_training.train.algorithms import ALGORITHMS, even_minibatch
+from posse_training.train.settings import BEST
 from posse_training.train.train import Run, steps_made, train
 from posse_training.train.worlds import make_env
 
@@ -72,13 +75,14 @@ def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: 
 
     def diverge(self: PPO) -> None:
         usual(self)
-        if self.num_timesteps > 800:
+        if self.num_timesteps > 800 and self.seed == 3:
             with torch.no_grad():
                 next(self.policy.parameters()).fill_(float("inf"))
 
     monkeypatch.setattr(PPO, "train", diverge)
-    with pytest.raises(RunFolderError, match=r"diverged at 960 steps"):
-        train(small(tmp_path / "run", steps=2560), console=quiet())
+    with pytest.raises(RunFolderError, match=r"seed 3: .* diverged at 960 steps"):
+        train_all([small(tmp_path / "run", steps=2560), replace(small(tmp_path / "next"), seed=4)], ray=False)
+    assert (tmp_path / "next" / BEST).is_file(), "another seed is trained"
     monkeypatch.undo()
     assert steps_saved(tmp_path / "run") == 640
     resume(tmp_path / "run")
