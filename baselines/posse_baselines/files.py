@@ -30,15 +30,16 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     partial = path.with_name(f"{_PREFIX}{secrets.token_hex(8)}{path.suffix}")
     try:
-        yield partial
-        partial.replace(path)
+        try:
+            yield partial
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
     except OSError as error:
         if error.errno is not None:
             error.filename = str(path)
             del error.filename2  # else a rename's, or None, is printed, too
         raise
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def remove_unfinished(folder: Path) -> None:

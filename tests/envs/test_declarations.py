@@ -63,6 +63,7 @@ MISTAKES: Final = {
     + FIELD.format('"1", 0, 1, size=2', "c, v", "v.step, 0").replace(".reset()", "\npickle.loads(pickle.dumps(old))"):
         "declarations have changed",
     # What the compiler says.
+    FIELD.format('"1", 0, 1', "c, v", "v.x"): r"own \(main.py:1\): unknown field 'x'; there is fix.x and own.x",
     FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): unknown field 'sped' \(did you mean 'own.speed'",
     MOTION.format("", "", 'w.goal_cos = "north"'): r"own \(main.py:1\): (.|\n)*to float32",
     TERM.format("c, w, t", "return [t.x][0]"): r"It creates an array, a list or a text",

@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -51,8 +52,12 @@ class Hangs(Idle):
         raise AssertionError
 
 
-class LeavesThread(Idle):
+class Leaves(Idle):
+    """Leaves a thread and a pool of processes behind."""
+
     def begin(self, layout: Any, num_worlds: int) -> Any:
+        self.pool = ProcessPoolExecutor(1)
+        assert self.pool.submit(abs, -3).result() == 3
         threading.Thread(target=time.sleep, args=(600.0,)).start()
         return super().begin(layout, num_worlds)
 

@@ -86,7 +86,6 @@ INVALID = {
     "train --scenario search --discount 0.1": "discount=0.1 is for ppo, mappo, sac and td3, not cmaes",
     "train --imitate-rounds 3": "imitate_rounds=3 is for --imitate",
     "train --family-scenarios 5": "family_scenarios=5 is for families of scenarios",
-    "submit idle --name \udcff": "'utf-8' codec can't encode character",
     "train --algorithm sac --steps 10_000": "learning_starts=20000 must be below steps=10000",
     "replay idle --set target_motion=agent": "the target of 'smart' is an agent",
     "replay none.html": "cannot read a replay from none.html",

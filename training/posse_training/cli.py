@@ -72,7 +72,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     module, _, function = COMMANDS[name][1].partition(":")
     try:
-        " ".join(rest).encode()  # words that are no UTF-8 fail here, and not when results are written
         options = [word.partition("=")[0].replace("_", "-") for word in rest if word.startswith("--")]
         bare = [option.replace("--no-", "--", 1) for option in options]
         for option in bare:
@@ -89,9 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from posse import DeclarationError, ScenarioError
         from posse_baselines import PolicyError
 
-        if not isinstance(
-            error, (UserError, ScenarioError, DeclarationError, PolicyError, OSError, UnicodeEncodeError)
-        ):
+        if not isinstance(error, (UserError, ScenarioError, DeclarationError, PolicyError, OSError)):
             raise
         if isinstance(error, BrokenPipeError):  # what reads the output, such as head, has read enough
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -87,33 +87,34 @@ def record_dataset(
     name = name or "-and-".join(each.name for each in players)
     called = f"posse/{scenario}/{re.sub(r'[^A-Za-z0-9_-]', '-', name)}-v0"
     folder = Path(out).resolve()  # Minari joins a relative one to itself
-    if (folder / called).exists():
-        raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
-    where = {"seed": seed, "split": split}
-    about = {
-        "version": posse.__version__,
-        "commit": commit(),
-        "scenario": settings.to_dict(),
-        **where,
-        "policies": [{"name": each.name, "card": getattr(each, "card", None)} for each in players],
-    }
-    env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
-    described = {
-        "dataset_id": called,
-        "author": {"posse"},
-        "algorithm_name": name,
-        "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
-        "requirements": [f"posse-rl=={posse.__version__}"],
-        "minari_version": minari.__version__,
-        "posse": json.dumps(about),
-    }
     partial = folder / f".recording-{called.replace('/', '-')}"
-    with locked(partial), progress_bar(disable=not progress) as bar, contextlib.ExitStack() as stack:
-        stack.callback(shutil.rmtree, partial)
+    with locked(partial), contextlib.ExitStack() as stack:
+        stack.callback(shutil.rmtree, partial, ignore_errors=True)
+        if (folder / called).exists():
+            raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
+        where = {"seed": seed, "split": split}
+        about = {
+            "version": posse.__version__,
+            "commit": commit(),
+            "scenario": settings.to_dict(),
+            **where,
+            "policies": [{"name": each.name, "card": getattr(each, "card", None)} for each in players],
+        }
+        env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
+        described = {
+            "dataset_id": called,
+            "author": {"posse"},
+            "algorithm_name": name,
+            "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
+            "requirements": [f"posse-rl=={posse.__version__}"],
+            "minari_version": minari.__version__,
+            "posse": json.dumps(about),
+        }
         shutil.rmtree(partial / "new", ignore_errors=True)  # of a recording that was killed
         (data := partial / "new" / "data").mkdir(parents=True)
         storage = MinariStorage.new(data, env.observation_space, env.action_space, env.spec)
         storage.update_metadata(described)
+        bar = stack.enter_context(progress_bar(disable=not progress))
         for world in bar.track(range(episodes), description="episodes"):
             buffer, metadata = _episode(players[world % len(players)], settings, world, where)
             storage.update_episodes([buffer])

@@ -18,6 +18,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -87,8 +88,9 @@ def _answer() -> None:
         # A hanging policy does not outlive a parent that was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         found.write(cloudpickle.dumps(_work(*call)))
-        found.flush()
-        os._exit(0)  # threads that a policy leaves behind end, too
+        ending = threading.Timer(_GRACE / 3, os._exit, (0,))  # also ends threads that a policy leaves behind
+        ending.daemon = True
+        ending.start()
 
 
 # --- a Ray cluster --------------------------------------------------------------------------------

@@ -169,7 +169,7 @@ class Encoder(OwnArrays):
         # The threads share out rows as if each were a world of one tracker.
         over_worlds(_write_all, (rows, (self._known, *works), estimates.reshape(-1), features), len(rows), 1)
         self.estimates[worlds] = estimates
-        return np.hstack([features.view(np.float32).reshape(len(rows), -1), read])
+        return np.hstack([features.view(np.float32).reshape(len(rows), self.encoding.num_features), read])
 
 
 @kernel

@@ -66,7 +66,7 @@ class View(NamedTuple):
     """
 
     number: Lanes  # of the tracker; -1: the target
-    own: Pose  # as it knows it
+    own: Pose  # as it knows it: fields of posse.rules.state.Pose
     touching: Lanes  # 1 while it touches anything, else 0
     working: Lanes  # 0 once it is broken, else 1
     step: Lanes  # control steps since the start
@@ -76,7 +76,7 @@ class View(NamedTuple):
     target_dx: Lanes  # vector to the target at the fix, m; for a bearing: a unit vector
     target_dy: Lanes
     target_distance: Lanes  # m
-    fix: Fix
+    fix: Fix  # of the target, common frame: fields of posse.rules.state.Fix
 
 
 @compiled

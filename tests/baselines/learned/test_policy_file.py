@@ -160,6 +160,8 @@ def test_an_error_while_writing_leaves_the_old_file_alone(tmp_path: Path, error:
     assert path.read_bytes() == b"old"
     with pytest.raises(IsADirectoryError, match=f"directory: {str(tmp_path)!r}$"):
         write_atomically(tmp_path, b"new")
+    with pytest.raises(NotADirectoryError, match=f"directory: {str(path / 'below')!r}$"):
+        write_atomically(path / "below", b"new")
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -71,6 +71,8 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
     ends: dict[str, Any] = {"horizon": 6, "command_delay": 4, "start_distance": (0.31, 0.31)}
     batch = posse.batch("smart", 2, target_policy=load_target("evader").policy, **ends)
     poses = {"tracker_pose": [(i, 3.0, 0.0) for i in range(5)], "target_pose": (0.0, 0.0, 0.0)}
+    with pytest.raises(posse.ScenarioError, match="could not place num_trackers=5 at start_distance"):
+        batch.reset()
     rollout(batch, Planner(QUICK), steps=5, options=poses)
 
 

@@ -54,12 +54,12 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_policy_that_hangs_is_ended_and_so_is_a_thread_that_one_leaves(
+def test_a_policy_that_hangs_is_ended_and_so_is_what_one_leaves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PID_FILE", str(tmp_path / "pid"))
-    found = compare(settings_for(tmp_path, "Hangs", "LeavesThread", limit=20.0))
-    assert {row["policy"] for row in found.rows} == {"idle", f"{BAD}LeavesThread", "pursuit"}
+    found = compare(settings_for(tmp_path, "Hangs", "Leaves", limit=20.0))
+    assert {row["policy"] for row in found.rows} == {"idle", f"{BAD}Leaves", "pursuit"}
     assert ["exceeded the time limit of 20 s" in row["why"] for row in found.failed] == [True]
     stat = Path("/proc", (tmp_path / "pid").read_text(), "stat")
     assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"

@@ -99,9 +99,11 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
         try:
             paths.append(train(settings))
         except RunFolderError as error:  # such as networks that diverge: other seeds are trained nevertheless
-            failed.append(RunFolderError(f"seed {settings.seed}: {error}"))
+            failed.append(f"seed {settings.seed}: {error}")
+            print(failed[-1], file=sys.stderr)
     if failed:
-        raise failed[0]
+        made = "".join(f"\nmade: {path}" for path in paths)
+        raise RunFolderError("\n".join(failed) + made)
     return paths
 
 

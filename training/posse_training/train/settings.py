@@ -219,6 +219,8 @@ class TrainSettings:
         for name in ("hidden", "team_sizes"):
             if isinstance(fitted.get(name), list):
                 fitted[name] = tuple(fitted[name])
+        if isinstance(fitted.get("folder"), str):
+            fitted["folder"] = Path(fitted["folder"])
         return cls(**fitted)
 
 

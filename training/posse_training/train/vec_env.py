@@ -4,7 +4,7 @@ All trackers share one policy, so that E worlds of N trackers are E x N environm
 single-agent learner. Slot ``e * N + i`` is tracker i of world e.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any, Final
 
@@ -191,7 +191,7 @@ class SlotGroup:
 
     def reset(self, seed: int | None, options: dict[str, Any] | None = None) -> FloatArray:
         """Start a shortened episode in every world; return the observations (slots, size)."""
-        if (options or {}).get("reset_mask") is not None:
+        if isinstance(options, Mapping) and options.get("reset_mask") is not None:
             raise ValueError("reset_mask leaves episodes running, and slots all begin one: leave it out")
         raw = self.batch.reset(seed=seed, options=options)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon

@@ -55,6 +55,8 @@ class StateReader:
         obstacles = *in_frame(disc["x"] - w["x"], disc["y"] - w["y"]), disc["radius"]
         rows = np.zeros((len(w), n, self.size), np.float32)
         rows[..., :TARGET_SIZE] = np.concatenate(target, axis=-1)
-        rows[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(len(w), n, -1)
+        rows[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(
+            len(w), n, n * TRACKER_SIZE
+        )
         rows[..., at : at + m * OBSTACLE_SIZE] = np.stack(obstacles, -1).reshape(len(w), 1, m * OBSTACLE_SIZE)
         return rows.reshape(-1, self.size)
