@@ -88,7 +88,7 @@ def _answer() -> None:
         # A hanging policy does not outlive a parent that was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         found.write(cloudpickle.dumps(_work(*call)))
-        ending = threading.Timer(_GRACE / 3, os._exit, (0,))  # also ends threads that a policy leaves behind
+        ending = threading.Timer(_GRACE / 3, os._exit, (0,))  # ends threads that a policy left, too
         ending.daemon = True
         ending.start()
 

@@ -53,6 +53,7 @@ def _why_not(function: Function, arguments: tuple[Any, ...], returns: str) -> st
                 parts = zip(view.fields, view.types, strict=True)
                 fields |= {f"{name}.{each}" for name, part in parts for each in getattr(part, "fields", ())}
             name = missing[1] if missing else error.args[0]
+            # As a part of another, such as v.own.x; those of the fix do not repeat that it is of the target.
             if here := sorted(each for each in fields if each.rpartition(".")[2] == name.removeprefix("target_")):
                 return f"unknown field {name!r}; there is {' and '.join(here)}"
             return unknown("field", name, sorted(fields)).partition(";")[0]  # without the list, which fills a page

@@ -100,7 +100,8 @@ def train_all(runs: Sequence[TrainSettings], ray: bool | str) -> list[Path]:
             paths.append(train(settings))
         except RunFolderError as error:  # such as networks that diverge: other seeds are trained nevertheless
             failed.append(f"seed {settings.seed}: {error}")
-            print(failed[-1], file=sys.stderr)
+            if settings is not runs[-1]:  # whose error is shown in any case
+                print(failed[-1], file=sys.stderr)
     if failed:
         made = "".join(f"\nmade: {path}" for path in paths)
         raise RunFolderError("\n".join(failed) + made)

@@ -80,7 +80,7 @@ def _identity(world: dict[str, Any]) -> dict[str, Any]:
 
 
 def join(replays: Sequence[Replay]) -> Replay:
-    """Combine the players of several replays of the same world; SettingsError for none, over 4, or several worlds."""
+    """Combine the players, one to four, of replays of one world, or raise SettingsError."""
     players = tuple(player for replay in replays for player in replay.players)
     if not 1 <= len(players) <= MOST_PLAYERS:
         raise SettingsError(

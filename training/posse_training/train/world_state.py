@@ -10,8 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from posse import Batch, Scenario
+from posse.declarations import plain
 from posse.numeric import FloatArray
-from posse.rules import NEVER
+from posse.rules import NEVER, in_frame
 
 TARGET_SIZE: Final = 6
 TRACKER_SIZE: Final = 11
@@ -44,19 +45,17 @@ class StateReader:
         order = (np.arange(n)[:, None] + np.arange(n)) % n  # of each tracker, itself first
         t = {name: tracker[name][:, order] for name in _READ}  # (E, N, N)
 
-        def in_frame(x: Any, y: Any) -> tuple[Any, Any]:
-            return x * w["frame_cos"] + y * w["frame_sin"], y * w["frame_cos"] - x * w["frame_sin"]
+        def framed(x: Any, y: Any) -> tuple[Any, Any]:
+            return plain(in_frame)(x, y, w["frame_cos"], w["frame_sin"])  # type: ignore[no-any-return]
 
         left = (s.horizon - w["step"]).astype(np.float32) * np.float32(s.control_step)  # s
-        target = w["speed"], w["turn_rate"], *in_frame(w["heading_cos"], w["heading_sin"]), w["score"], left
-        place, heading = in_frame(t["x"] - w["x"], t["y"] - w["y"]), in_frame(t["heading_cos"], t["heading_sin"])
+        target = w["speed"], w["turn_rate"], *framed(w["heading_cos"], w["heading_sin"]), w["score"], left
+        place, heading = framed(t["x"] - w["x"], t["y"] - w["y"]), framed(t["heading_cos"], t["heading_sin"])
         flags = t["broken_at"] == NEVER, t["slot"] >= 0, t["slot_distance"], t["sees"], t["touching"]
         trackers = *place, *heading, t["speed"], t["turn_rate"], *flags
-        obstacles = *in_frame(disc["x"] - w["x"], disc["y"] - w["y"]), disc["radius"]
-        rows = np.zeros((len(w), n, self.size), np.float32)
+        obstacles = *framed(disc["x"] - w["x"], disc["y"] - w["y"]), disc["radius"]
+        rows, size = np.zeros((len(w), n, self.size), np.float32), n * TRACKER_SIZE
         rows[..., :TARGET_SIZE] = np.concatenate(target, axis=-1)
-        rows[..., TARGET_SIZE : TARGET_SIZE + n * TRACKER_SIZE] = np.stack(trackers, -1).reshape(
-            len(w), n, n * TRACKER_SIZE
-        )
+        rows[..., TARGET_SIZE : TARGET_SIZE + size] = np.stack(trackers, -1).reshape(len(w), n, size)
         rows[..., at : at + m * OBSTACLE_SIZE] = np.stack(obstacles, -1).reshape(len(w), 1, m * OBSTACLE_SIZE)
         return rows.reshape(-1, self.size)
