@@ -36,7 +36,7 @@ SHORTER = {
     r"^posse compare (?!.*--scenario).*$": r"\g<0> --scenario smart",
     r"^posse compare .*$": r"\g<0> --episodes 2 --no-figures --planner-episodes 0",
     r"^posse submit .*$": r"\g<0> --episodes 4 --name mine",
-    r"^posse verify .*$": r"\g<0> --episodes 4",
+    r"^posse verify .*$": r"\g<0> --episodes 4 --seed 3",
     r"^posse tune .*$": r"\g<0> --generations 1 --population 4 --worlds 2 --validation-worlds 2",
     r"^posse (replay|watch .*--page).*$": r"\g<0> --seconds 1",
     r"--seconds \d+": "--seconds 1",
