@@ -82,11 +82,11 @@ def test_a_mirrored_world_is_played_as_the_world(tmp_path: Path, how: dict[str, 
 
 def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
     """Each of three at once has the score that it has alone, in two worlds of each of two opponents."""
-    changes = {**EVOLVED, "overrides": {**EVOLVED["overrides"], "horizon": 200}, "num_worlds": 4}
+    changes = {**EVOLVED, "overrides": {**EVOLVED["overrides"], "horizon": 60}, "num_worlds": 4}
     settings = small(tmp_path, "cmaes", **changes, target="smart,evader")
     weights = np.zeros((3, 2, 17), np.float32)
-    weights[1:] = np.random.default_rng(0).normal(0.0, 0.05, (2, 2, 17))
+    weights[1:] = np.random.default_rng(0).normal(0.0, 0.1, (2, 2, 17))
     together = Candidates(settings, weights).scores(5, None)
     alone = [Candidates(settings, weights[k : k + 1]).scores(5, None)[0] for k in range(3)]
-    assert together == pytest.approx(alone, abs=0.02)
+    assert together == pytest.approx(alone, abs=0.002)  # longer episodes would amplify rounding
     assert np.ptp(alone) > 0.05
