@@ -46,6 +46,7 @@ class BatchEnv:
     """Returns the scenario of a name, or a scenario, and overrides."""
     _make: Callable[..., Batch] = staticmethod(batch)
     """Returns the worlds."""
+    _renderer: Any = None  # here, since gymnasium before 1.3 closes what could not be made
 
     def __init__(
         self,
@@ -69,7 +70,6 @@ class BatchEnv:
         self.metadata = {**type(self).metadata, "render_fps": fps}  # type: ignore[misc]
         self._discrete = discrete_actions
         self._seeded = seed is not None
-        self._renderer: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
