@@ -46,4 +46,4 @@ def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[
     """Run code with a user's modules in a new process."""
     for name, source in {**modules, "main": code}.items():
         (folder / f"{name}.py").write_text(source, encoding="utf-8")
-    return python("main.py", cwd=folder)
+    return python("main.py", cwd=folder, PYTHONDONTWRITEBYTECODE="1")  # bytecode tells edits by their second and size
