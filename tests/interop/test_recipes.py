@@ -21,20 +21,20 @@ OURS = [name for name in NAMES if name not in OWN_ENVIRONMENT]
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in OURS])
 def test_a_recipe_runs(name: str, tmp_path: Path) -> None:
-    printed("-W", "ignore", RECIPES / f"{name}.py", cwd=tmp_path, seconds=300)
+    printed("-W", "ignore", RECIPES / f"{name}.py", cwd=tmp_path)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
 def test_a_recipe_runs_in_an_environment_of_its_own(name: str, tmp_path: Path) -> None:
     alone = {"RAY_ADDRESS": "local"}  # of another test there may be a cluster
-    elsewhere(RECIPES / f"{name}.py", environment=OWN_ENVIRONMENT[name], cwd=tmp_path, seconds=300, **alone)
+    elsewhere(RECIPES / f"{name}.py", environment=OWN_ENVIRONMENT[name], cwd=tmp_path, **alone)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("team", ["pngl-l-phi", "ddcs-distributed"])
 def test_late_robots_of_the_robotarium_form_up(team: str, tmp_path: Path) -> None:
-    shown = elsewhere(RECIPES / "robotarium.py", team, "0.5", "3", cwd=tmp_path, seconds=300)
+    shown = elsewhere(RECIPES / "robotarium.py", team, "0.5", "3", cwd=tmp_path)
     settled, clean = (int(part.split()[0]) for part in shown.splitlines()[-1].split(", "))
     assert settled >= 19
     assert clean == 20
