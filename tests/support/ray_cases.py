@@ -35,7 +35,7 @@ def nodes() -> Iterator[Cluster]:
     found = Cluster(initialize_head=True, head_node_args=head)
     for _ in range(2):
         found.add_node(num_cpus=1, wait=False)
-    found.wait_for_nodes()
+    found.wait_for_nodes(timeout=120)
     ray.init(address=found.address, log_to_driver=False, logging_level="error")
     yield found
     ray.shutdown()
