@@ -8,7 +8,8 @@ from hypothesis import settings
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # With colorama, numba prepares the colours of messages that it never shows: some percent of the time to compile.
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
-# Windows of tests need no screen.
+# Windows of tests need no screen; what commands print is compared in 80 columns and without colours.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.update(COLUMNS="80", FORCE_COLOR="")
 # Properties are tried on the same examples in every run, and however long one takes.
 settings.load_profile("ci")
