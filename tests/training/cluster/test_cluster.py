@@ -43,4 +43,4 @@ def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> 
 
 @pytest.mark.long
 def test_on_a_cluster_of_two_nodes(tmp_path: Path) -> None:
-    run_tests_elsewhere("tests/support/ray_cases.py", tmp_path, RAY_AUTH_MODE="disabled")
+    run_tests_elsewhere("tests/support/ray_cases.py", tmp_path, seconds=1800.0, RAY_AUTH_MODE="disabled")
