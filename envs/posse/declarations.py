@@ -38,7 +38,9 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> str:
     names, text = tuple(known), name if isinstance(name, str) else reprlib.repr(name)
     near = difflib.get_close_matches(text[:100], names, n=3, cutoff=0.5)
     hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-    return f"unknown {kind} {reprlib.repr(name)}{hint}; known: {', '.join(names) or 'none'}"
+    own = ". To use one of your own, import its module first (commands: --import MODULE)"
+    more = own if isinstance(known, Registry) else ""
+    return f"unknown {kind} {reprlib.repr(name)}{hint}; known: {', '.join(names) or 'none'}{more}"
 
 
 class DeclarationError(ValueError):
@@ -79,11 +81,6 @@ class Registry(dict[str, D]):
         """Return the built-in declarations, in order, then the named ones, each once; KeyError for an unknown name."""
         built_in = [each for each in self.values() if each.built_in]
         return tuple(dict.fromkeys((*built_in, *(self[name] for name in names))))
-
-
-def undeclared(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the message for a name that is not declared."""
-    return f"{unknown(kind, name, known)}. To use one of your own, import its module first (commands: --import MODULE)"
 
 
 class Declaration:

@@ -25,10 +25,10 @@ from posse.declarations import (
     SENSORS,
     TARGET_MOTIONS,
     Declarations,
+    Registry,
     field,
     metric,
     reward_term,
-    undeclared,
     unknown,
 )
 from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
@@ -487,7 +487,7 @@ def _in_time_and_space(s: Scenario) -> _Conflicts:
 
 
 def _in_declarations(s: Scenario) -> _Conflicts:
-    of_target = {name: term for name, term in REWARD_TERMS.items() if term.of_target is not None}
+    of_target = Registry({name: term for name, term in REWARD_TERMS.items() if term.of_target is not None})
     for where, names, kind, known in (
         ("extra_fields", s.extra_fields, field.kind, FIELDS),
         ("metrics", s.metrics, metric.kind, METRICS),
@@ -498,6 +498,6 @@ def _in_declarations(s: Scenario) -> _Conflicts:
             if known is of_target and name in REWARD_TERMS and name not in known:
                 yield where, f"{name!r} has no formula for a target: declare one by target=, or leave it out"
             elif name not in known:
-                yield where, undeclared(kind, name, known)
+                yield where, unknown(kind, name, known)
     for name in (name for name in s.extra_fields if FIELDS[name].built_in):
         yield "extra_fields", f"{name!r} is in every observation: leave it out"

@@ -10,7 +10,7 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
-from posse.declarations import Registry, undeclared, unknown
+from posse.declarations import unknown
 
 SPLITS: Final = ("train", "validation", "test")
 """Parts of all worlds, which have none in common."""
@@ -39,7 +39,7 @@ def check_count(name: str, value: object, least: int) -> int:
 def check_choice(name: str, value: object, choices: Iterable[str]) -> str:
     """Return one of the choices, or raise ScenarioError."""
     if not isinstance(value, str) or value not in choices:
-        raise ScenarioError((undeclared if isinstance(choices, Registry) else unknown)(name, value, choices))
+        raise ScenarioError(unknown(name, value, choices))
     return value
 
 
