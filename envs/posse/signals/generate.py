@@ -4,8 +4,6 @@ numba cannot loop over a tuple of functions, since each function has a type of i
 written out, with one line for each declared function that they call. :func:`posse.kernel_source` returns the text.
 """
 
-import functools
-import linecache
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
@@ -18,14 +16,11 @@ from posse.scenarios import Scenario, get_scenario
 from posse.signals.views import Generated
 
 
-@functools.cache
 def generated_for(declarations: Declarations) -> Generated:
     """Return the compiled functions for declarations."""
     module = _Module(declarations)
-    file = f"<posse kernel source {id(module):x}>"
-    linecache.cache[file] = (len(module.text), None, module.text.splitlines(keepends=True), file)  # for tracebacks
     scope: dict[str, Any] = {"__name__": __name__, **module.functions}
-    exec(compile(module.text, file, "exec"), scope)
+    exec(compile(module.text, "<posse.kernel_source>", "exec"), scope)
     return Generated(**{name: scope[name] for name in Generated._fields})
 
 
