@@ -99,8 +99,7 @@ class _Module:
     def _call(self, alias: str, function: Function) -> str:
         """Return the call of a declared function with its parameters as arguments."""
         alias = alias.replace("-", "_")
-        while self.functions.setdefault(alias, function) is not function:
-            alias += "_"
+        self.functions[alias] = function
         return f"{alias}({', '.join(parameters_of(function))})"
 
     def _columns(self, fields: Iterable[field]) -> Iterator[str]:
