@@ -13,14 +13,14 @@ the sums of metrics are not included.
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import FIELDS, Declarations, Field
 from posse.numeric import FloatArray
-from posse.rules.state import NEVER, WorldArrays
+from posse.rules.state import NEVER, Fix, Pose, WorldArrays
 from posse.scenarios import Scenario
 from posse.scenarios.scenario import SLACK
 
@@ -99,13 +99,6 @@ class ObservationLayout:
         return views
 
 
-_Values = npt.NDArray[Any]
-
-_POSE: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
-_FIX: Final = ("fix_x", "fix_y", "fix_cos", "fix_sin", "fix_frame_cos", "fix_frame_sin")
-_ERRORS: Final = ("odometry_x", "odometry_y", "odometry_heading")
-
-
 class StateLayout:
     """The entries of a scenario's state vector, in physical units; control steps are times in s.
 
@@ -130,7 +123,7 @@ class StateLayout:
         parts = [self._read(field, fields).reshape(len(arrays.world), -1) for field in self.shapes]
         return np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind")
 
-    def _read(self, field: str, fields: Mapping[str, _Values]) -> _Values:
+    def _read(self, field: str, fields: Mapping[str, npt.NDArray[Any]]) -> npt.NDArray[Any]:
         """Return the values of a field, (E, *shape)."""
         values, array = fields[field], field.partition("_")[0]
         is_step = values.dtype == np.int32 and field.endswith(("_step", "_at", "_from"))
@@ -166,13 +159,14 @@ def _entries(s: Scenario) -> tuple[str, ...]:
     receiver and sender.
     """
     memory = (each for motion in Declarations.of(s).motions for each in motion.memory)
-    errors = _ERRORS if s.drifts else ()
-    world = ("step", *_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin", *memory, "break_step", "breaks_left")
+    errors = ("odometry_x", "odometry_y", "odometry_heading") if s.drifts else ()
+    pose, fix = Pose._fields[:6], [f"fix_{name}" for name in Fix._fields]  # of a pose without its limits
+    world = ("step", *pose, "frame_cos", "frame_sin", "goal_cos", "goal_sin", *memory, "break_step", "breaks_left")
     faults = ("broken_at", "breaks_at", "sensor_dead_from", "radio_dead_from", "sees")
     return (
         *(f"world_{name}" for name in world),
-        *(f"tracker_{name}" for name in (*_POSE, *_FIX, "fix_vx", "fix_vy", "fix_step", *faults)),
+        *(f"tracker_{name}" for name in (*pose, *fix, "fix_step", *faults)),
         *(*errors, "command", "obstacle_x", "obstacle_y", "obstacle_radius", "message", "heard_message"),
-        *(f"heard_{name}" for name in ("step", *_POSE)),
-        *(f"broadcast_{name}" for name in ("sent", "fix_step", *_POSE, *_FIX, *errors)),
+        *(f"heard_{name}" for name in ("step", *pose)),
+        *(f"broadcast_{name}" for name in ("sent", "fix_step", *pose, *fix[:6], *errors)),
     )
