@@ -335,16 +335,16 @@ class Batch(OwnArrays):
         self.check_running()
         actions, results = self.actions_of(actions), self._new_results()
         begun = self._over > 0 and self.autoreset == "next_step"
-        over = self._advance(actions, results) > 0
+        self._advance(actions, results)
         observations, rewards, terms, scores, terminated, truncated = results
         infos = self._infos_of(scores, terms)
-        if over:
+        if self._over:
             ended = terminated | truncated
             for name, values in self.metrics().items():
                 infos[f"metrics/{name}"] = np.where(ended, values, 0.0)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
-            if over:
+            if self._over:
                 self.arrays.world["episode"][ended] += 1
                 observations, begun = self._execute(START, ended), True
         if begun:
@@ -369,18 +369,17 @@ class Batch(OwnArrays):
             infos["working"] = self.working
         return infos
 
-    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
-        """Advance every world by valid actions, or execute its order; return how many episodes are over.
+    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> None:
+        """Advance every world by valid actions, or execute its order, and note how many episodes are over.
 
         Several threads share the worlds. Episodes that end are not started anew.
         """
         arguments = self._fixed, self._orders if orders is None else orders, actions, results
         threads = len(self._fixed.scratch)
         if threads == 1:  # as over_worlds() does, which would take a tenth longer for one world
-            over = self._kernel(*arguments, 0, 0, self.num_worlds)
+            self._over = self._kernel(*arguments, 0, 0, self.num_worlds)
         else:
-            over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
-        self._over = over
+            self._over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
         if self._own_rules and not np.isfinite(results.observations).all():
@@ -390,7 +389,6 @@ class Batch(OwnArrays):
                 f"an observation is not finite: see what target_motion={s.target_motion!r} sets, and what "
                 f"sensor={s.sensor!r} measures"
             )
-        return over
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""

@@ -97,7 +97,7 @@ class PairedBatch(Batch):
         working = super().working
         return working if isinstance(self.outside, str) else working[:, self._mine]
 
-    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> int:
+    def _advance(self, actions: FloatArray, results: Results, orders: Orders | None = None) -> None:
         """Advance every world by valid actions of this side and those of the policy inside.
 
         If the policy's actions are invalid, neither the worlds nor its memory change.
@@ -107,12 +107,11 @@ class PairedBatch(Batch):
             whole, self.memory = self._with_theirs(actions)
         observations, rewards, terms = (np.empty_like(array) for array in self.everyone[1][:3])
         every = results._replace(observations=observations, rewards=rewards, terms=terms)
-        over = super()._advance(whole, every, orders)
+        super()._advance(whole, every, orders)
         # Other orders replace what is observed, not what came of the last step.
         self.everyone = whole, every if orders is None else came._replace(observations=observations)
         for mine, array in zip(results[:3], every[:3], strict=True):
             mine[...] = array[:, self._mine]
-        return over
 
     def _with_theirs(self, mine: FloatArray) -> tuple[FloatArray, Any]:
         """Return the actions of all robots, and the memory of the policy inside."""
