@@ -41,8 +41,6 @@ _CHANGED: Final = "the declarations have changed since these worlds were made: m
 # A list, since looking for them in __dict__ would make Python 3.11 read all attributes of a batch five times slower.
 _DERIVED: Final = frozenset(("_declared", "_own_terms", "_own_rules", "_kernel", "_orders", "_fixed", "_info"))
 
-Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
-
 
 @dataclass(frozen=True)
 class Snapshot(OwnArrays):
@@ -311,7 +309,7 @@ class Batch(OwnArrays):
 
     # The step.
 
-    def step(self, actions: npt.ArrayLike) -> Step:
+    def step(self, actions: npt.ArrayLike) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance every world by one control step.
 
         Args:
