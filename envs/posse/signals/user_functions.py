@@ -8,13 +8,12 @@ import numpy as np
 from numba.core import types
 
 from posse.declarations import Declarations, Function, parameters_of, plain, unknown
-from posse.numeric import UNCOMPILED
+from posse.numeric import UNCOMPILED, compiled
 from posse.numeric.lanes import LanesType, tuple_of_lanes
 from posse.rules.state import CONFIG, OBSTACLE, SCRATCH, SLOT, TRACKER, world_record
 from posse.signals.views import Mate, View
 
-_njit: Final[Any] = numba.njit  # Any: its types lack _nrt
-_typeof: Final[Any] = numba.typeof
+_typeof: Final[Any] = numba.typeof  # Any: it has no types
 
 
 def check_functions(declarations: Declarations) -> None:
@@ -41,7 +40,7 @@ def check_functions(declarations: Declarations) -> None:
 
 def _why_not(function: Function, arguments: tuple[Any, ...], returns: str) -> str:
     """Compile a function alone; return the reason of its error, which is numba's message with the line, or none."""
-    alone: Any = _njit(error_model="numpy", _nrt=False)(plain(function))
+    alone: Any = compiled(plain(function))  # anew, since what it reaches may have changed
     try:
         alone.compile(arguments)
     except Exception as error:  # the compiler may raise anything
