@@ -378,8 +378,8 @@ class Batch(OwnArrays):
             self._over = self._kernel(*arguments, 0, 0, self.num_worlds)
         else:
             self._over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
-        if self._own_terms:
-            check_terms(self._declared.reward_terms, results.rewards, results.terms)
+        if self._own_terms and not np.isfinite(results.rewards).all():
+            check_terms(self._declared.reward_terms, results.terms)
         if self._own_rules and not np.isfinite(results.observations).all():
             self.layout.check_added(results.observations)
             s = self.scenario

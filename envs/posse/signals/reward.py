@@ -64,10 +64,8 @@ def team(c: Record, w: Record) -> np.float32:
     return np.float32(w.score)
 
 
-def check_terms(terms: Sequence[reward_term], rewards: FloatArray, values: FloatArray) -> None:
-    """Raise DeclarationError if a reward is not finite, for the term whose value (..., K) is not."""
-    if np.isfinite(rewards).all():
-        return
+def check_terms(terms: Sequence[reward_term], values: FloatArray) -> None:
+    """Raise DeclarationError for a term whose values, of (..., K), are not all finite."""
     for k, term in enumerate(terms):
         wrong = values[..., k][~np.isfinite(values[..., k])]
         if wrong.size:
