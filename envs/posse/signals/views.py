@@ -230,14 +230,12 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
         _fields_of(worlds, observers, p, 7, s),
     )
     x, y, cos, sin, speed, turn_rate, sent, _ = transpose(rows)
-    age = eight(ZERO) if observers.now else (v.step - from_int(sent)) * c.control_step
-    distance, dx, dy = load(s.mate_distance[p], 0), x - v.own.x, y - v.own.y
     return Mate(
         number=load(s.mate_number[p], 0),
-        age=age,
-        dx=dx,
-        dy=dy,
-        distance=distance,
+        age=eight(ZERO) if observers.now else (v.step - from_int(sent)) * c.control_step,
+        dx=x - v.own.x,
+        dy=y - v.own.y,
+        distance=load(s.mate_distance[p], 0),
         heading_cos=cos,
         heading_sin=sin,
         speed=speed,
