@@ -49,7 +49,6 @@ class Policy(TargetPolicy, Protocol):
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal quantities of the trackers; empty if there are none."""
-        ...
 
 
 class BasePolicy:

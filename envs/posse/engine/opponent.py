@@ -27,18 +27,15 @@ class TargetPolicy(Protocol):
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory for the first step of ``num_worlds`` worlds."""
-        ...
 
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, 1, 2 or more) in [-1, 1] for observations (E, 1, F), and the memory.
 
         The first two numbers of an action are the target's speed and turn rate.
         """
-        ...
 
     def restart(self, memory: Any, mask: BoolArray) -> Any:
         """Return the memory with the worlds of a mask (E,) reset to those of :meth:`begin`."""
-        ...
 
 
 class PairedBatch(Batch):
