@@ -160,6 +160,12 @@ def test_the_generated_source_can_be_read() -> None:
         assert call in source
 
 
+def test_a_motion_may_be_called_motion() -> None:
+    """What draws it has a name of its own in the generated module."""
+    code = MOTION.replace("own", "motion").format(", draw=draw", "", "pass")
+    printed("-c", f"import posse\ndef draw(c, w):\n    pass\n{code}.reset()", NUMBA_DISABLE_JIT="1")
+
+
 EXAMPLES = {Path(title).stem: text for _, title, text in blocks("docs/extend.md") if title is not None}
 
 

@@ -147,7 +147,7 @@ def advance_worlds(
                 keep_messages(c, w, trackers, actions[e], worlds.message[e])
         elif order != LOOK:
             if order == START:
-                draw_start(c, w, trackers, obstacles, made.draw_motion)
+                draw_start(c, w, trackers, obstacles, made.begin_motion)
             begin(c, worlds, e)
             made.clear_sums(w)
         lay_out(c, w, trackers, obstacles, scratch)

@@ -144,14 +144,14 @@ def begin(c: Record, worlds: WorldArrays, e: int) -> None:
 
 
 @compiled
-def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
+def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, begin_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)
     w.undrawn = 0
     draw_obstacles(c, w, obstacles)
     draw_target(c, w, obstacles)
     draw_trackers(c, w, trackers, obstacles)
-    draw_motion(c, w)
+    begin_motion(c, w)
     draw_faults(c, w, trackers)
 
 

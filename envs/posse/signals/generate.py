@@ -65,7 +65,7 @@ class _Module:
             "write_mate(c, v, m, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
             "reward(c, w, t, weights, values)": self._reward({f"term_{t.name}": t.function for t in terms}),
             "target_reward(c, w, weights, values)": self._reward({f"target_term_{t.name}": t.of_target for t in terms}),
-            "draw_motion(c, w)": [
+            "begin_motion(c, w)": [
                 *(f"w.{memory} = ZERO" for motion in motions for memory in motion.memory),
                 *self._chosen("motion", {f"draw_{each.name}": each.draw for each in motions}, "{}"),
             ],

@@ -148,7 +148,7 @@ class Generated(NamedTuple):
     write_mate: Any  # writes those of a team-mate of each; the values for "unknown" where there is none
     reward: Any  # returns the reward of a tracker, and writes the values of its terms, (K,)
     target_reward: Any  # returns the same of a target that is an agent
-    draw_motion: Any  # clears the memories of the target's motion, and draws its parameters for an episode
+    begin_motion: Any  # clears the memories of the target's motion, and draws its parameters for an episode
     set_goal: Any  # sets the goal heading of a scripted target
     sees: Any  # returns whether the target, (dx, dy) away, is in sight of a tracker
     measure: Any  # returns the vector to the target as measured
