@@ -47,10 +47,6 @@ def _whole_arcs(s: Scenario) -> bool:
     return turn <= 1.0 and unlimited and s.actuator_lag == 0
 
 
-def _measured(s: Scenario) -> bool:
-    return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
-
-
 def _share(time: float, constant: float) -> float:
     """Return the share by which a first-order lag of a time constant comes nearer to its goal in a time."""
     return 1 - math.exp(-time / constant) if constant > 0 else 1.0
@@ -70,7 +66,8 @@ DERIVED: Final[_Numbers] = {
     "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and s.walled),
     "sensor": (_I, lambda s: SENSORS.of(s.sensor).index(SENSORS[s.sensor])),
     "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
-    "measured": (_I, _measured),  # 0: sensors return the target's true position
+    # 0: sensors return the target's true position
+    "measured": (_I, lambda s: s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None),
     "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
     "whole_arcs": (_I, _whole_arcs),
@@ -84,6 +81,10 @@ DERIVED: Final[_Numbers] = {
     "per_turn_acceleration": (_F, lambda s: 1 / s.tracker_turn_acceleration),
     "frame_c": (_F, lambda s: math.cos(_frame_turn(s))),
     "frame_s": (_F, lambda s: math.sin(_frame_turn(s))),
+    "start_distance_least": (_F, lambda s: s.start_distance[0]),
+    "start_distance_most": (_F, lambda s: s.start_distance[1]),
+    "obstacle_radius_least": (_F, lambda s: s.obstacle_radius[0]),
+    "obstacle_radius_most": (_F, lambda s: s.obstacle_radius[1]),
     "slots_reach": (_F, lambda s: max(math.hypot(*slot) for slot in s.slot_offsets)),
     "half_width": (_F, lambda s: s.half_sides[0]),
     "half_height": (_F, lambda s: s.half_sides[1]),
@@ -97,28 +98,15 @@ DERIVED: Final[_Numbers] = {
 """What kernels read of a scenario beside its numbers: type and value."""
 
 
-def _of_pair(name: str, place: int) -> Callable[[Scenario], float]:
-    return lambda s: getattr(s, name)[place]
-
-
-def _of_settings() -> _Numbers:
-    """Return the numbers among the settings of a scenario: type and value."""
-    numbers: _Numbers = {}
-    for name, setting in Scenario.settings().items():
-        if setting.kind in _NUMERIC:
-            numbers[name] = _NUMERIC[setting.kind], attrgetter(name)
-        elif setting.kind == "tuple[float, float]":
-            numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _of_pair(name, 0)), (_F, _of_pair(name, 1))
-    return numbers
-
-
-_NUMBERS: Final = {**_of_settings(), **DERIVED}
+_SETTINGS: Final[_Numbers] = {
+    name: (_NUMERIC[setting.kind], attrgetter(name))
+    for name, setting in Scenario.settings().items()
+    if setting.kind in _NUMERIC
+}
+_NUMBERS: Final = {**_SETTINGS, **DERIVED}
 
 CONFIG: Final = record_type(*((name, kind) for name, (kind, _) in _NUMBERS.items()))
-"""The scenario, for kernels: its numbers by the names of its settings, then :data:`DERIVED`.
-
-``inf`` is ``UNLIMITED``; a pair is ``_least`` and ``_most``.
-"""
+"""The scenario, for kernels: its numbers by the names of its settings, then :data:`DERIVED`; inf is ``UNLIMITED``."""
 
 # Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
 
