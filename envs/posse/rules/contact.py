@@ -13,12 +13,12 @@ from posse.numeric import ONE, WIDTH, ZERO, Lanes, Record, Records, choose, comp
 from posse.numeric.lanes import bits, least, load
 from posse.rules.discs import TOUCHING_GAP, blocks, surroundings_within
 from posse.rules.state import BIT, NO_BITS
+from posse.scenarios.scenario import MAX_OBSTACLES
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
 
 _TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
-_FIRST_WALL: Final = 60
 
 
 @compiled
@@ -154,7 +154,7 @@ def contacts_of(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: 
     if c.walled:
         for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
             if along >= (c.half_width if k < 2 else c.half_height) - c.robot_radius - TOUCHING_GAP:
-                touching |= BIT << np.uint64(_FIRST_WALL + k)
+                touching |= BIT << np.uint64(MAX_OBSTACLES + k)  # the last bits
     begun = count_bits(touching & ~t.touching_obstacles)
     t.onsets += begun
     w.contacts_obstacle += begun

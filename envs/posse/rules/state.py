@@ -370,8 +370,7 @@ def config_record(scenario: Scenario) -> Records:
     return config
 
 
-TEAM: Final = MAX_TRACKERS
-ROBOTS: Final = TEAM + WIDTH
+ROBOTS: Final = MAX_TRACKERS + WIDTH
 """Length of rows of trackers, target and padding."""
 DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
 """Length of rows of robots, obstacles and padding."""
@@ -387,18 +386,18 @@ SCRATCH: Final = record_type(
     ("beam_sin", _F, MAX_BEAMS),
     ("reading", _F, MAX_BEAMS),  # m
     # Trackers.
-    ("gap", _F, TEAM),  # clearance to the nearest disc, m
-    ("excess", _F, TEAM),  # above 0 only if nothing is near; a sign alone, m² to robots and m to obstacles
-    ("slot", _F, TEAM),  # number of the nearest slot, or of the nearest free one
-    ("slot_distance", _F, TEAM),  # distance to it, m
-    ("slot_distance2", _F, TEAM),  # squared, m²
+    ("gap", _F, MAX_TRACKERS),  # clearance to the nearest disc, m
+    ("excess", _F, MAX_TRACKERS),  # above 0 only if nothing is near; a sign alone, m² to robots and m to obstacles
+    ("slot", _F, MAX_TRACKERS),  # number of the nearest slot, or of the nearest free one
+    ("slot_distance", _F, MAX_TRACKERS),  # distance to it, m
+    ("slot_distance2", _F, MAX_TRACKERS),  # squared, m²
     # Motion.
     ("worth", _F, 2 * WIDTH),  # value of each direction considered by a smart target
     # Observations: eight numbers, one for each of eight worlds.
-    ("team_x", _F, (TEAM, WIDTH)),  # of each tracker
-    ("team_y", _F, (TEAM, WIDTH)),
-    ("mate_number", _F, (TEAM, WIDTH)),  # of the team-mate in each place; -1: none
-    ("mate_distance", _F, (TEAM, WIDTH)),  # m
+    ("team_x", _F, (MAX_TRACKERS, WIDTH)),  # of each tracker
+    ("team_y", _F, (MAX_TRACKERS, WIDTH)),
+    ("mate_number", _F, (MAX_TRACKERS, WIDTH)),  # of the team-mate in each place; -1: none
+    ("mate_distance", _F, (MAX_TRACKERS, WIDTH)),  # m
 )
 """Scratch memory of a thread."""
 
