@@ -1,6 +1,7 @@
 """A batch in which a policy moves some robots: the target, the trackers, or all trackers but one."""
 
 import copy
+import itertools
 import reprlib
 from typing import Any, Protocol, runtime_checkable
 
@@ -11,8 +12,8 @@ from posse.engine.batch import Batch, of_batch
 from posse.engine.kernels import Orders, Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Family, Scenario, ScenarioError, get_scenario
-from posse.scenarios.family import scenario_or_family, shares
-from posse.scenarios.setting import check_choice, check_count
+from posse.scenarios.family import scenario_or_family
+from posse.scenarios.setting import check_choice, check_count, fail
 from posse.signals.layout import ObservationLayout
 
 
@@ -176,8 +177,12 @@ def batches(
     """
     for name, count in (("num_worlds", num_worlds), ("scenarios", scenarios)):
         check_count(name, count, 1)
-    parts = shares(scenario_or_family(scenario), num_worlds, scenarios, seed, split)
+    given = scenario_or_family(scenario)
+    drawn = [given.draw(k, seed, split) for k in range(scenarios)] if isinstance(given, Family) else [given]
+    if num_worlds < len(drawn):
+        fail("num_worlds", num_worlds, f"it must be at least {len(drawn)}, one for each scenario")
+    ends = [num_worlds * k // len(drawn) for k in range(len(drawn) + 1)]
     return [
-        batch(one, len(part), seed=seed, split=split, first_world=first_world + part.start, **settings)
-        for one, part in parts
+        batch(one, end - first, seed=seed, split=split, first_world=first_world + first, **settings)
+        for one, (first, end) in zip(drawn, itertools.pairwise(ends), strict=True)
     ]

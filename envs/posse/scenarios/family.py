@@ -178,17 +178,6 @@ def scenario_or_family(given: str | Scenario | Family, **overrides: Any) -> Scen
     return get_scenario(given, **overrides)
 
 
-def shares(
-    given: Scenario | Family, num_worlds: int, scenarios: int, seed: int, split: str
-) -> list[tuple[Scenario, range]]:
-    """Return so many drawn scenarios of a family, or the one given, each with an equal share of the worlds."""
-    drawn = [given.draw(k, seed, split) for k in range(scenarios)] if isinstance(given, Family) else [given]
-    if num_worlds < len(drawn):
-        fail("num_worlds", num_worlds, f"it must be at least {len(drawn)}, one for each scenario")
-    ends = [num_worlds * k // len(drawn) for k in range(len(drawn) + 1)]
-    return [(one, range(first, end)) for one, (first, end) in zip(drawn, itertools.pairwise(ends), strict=True)]
-
-
 def blocks(given: Scenario | Family, worlds: range, seed: int, split: str) -> Iterator[tuple[Scenario, range]]:
     """Yield the scenario of each block of worlds: of a scenario one block, of a family its drawn scenarios."""
     if isinstance(given, Scenario):

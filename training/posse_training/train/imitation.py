@@ -16,7 +16,7 @@ from torch.nn.functional import mse_loss
 
 from posse import Batch, Scenario
 from posse.numeric import FloatArray
-from posse.scenarios.family import shares
+from posse.scenarios.family import BLOCK, blocks
 from posse_baselines import batch_for
 from posse_baselines.learned import Encoding
 from posse_baselines.policy import Policy, begin
@@ -72,7 +72,7 @@ def imitate(
         return total / rows
 
     drawn, pairs = settings.family_scenarios, pairings(settings)
-    parts = [(shares(pair.scenario, drawn, drawn, settings.seed, "train"), pair.opponent) for pair in pairs]
+    parts = [(blocks(pair.scenario, range(drawn * BLOCK), settings.seed, "train"), pair.opponent) for pair in pairs]
     plays: list[tuple[Scenario, Any]] = [(scenario, target) for part, target in parts for scenario, _ in part]
     worlds = max(1, WORLDS // len(plays))
     seen = [scenario for scenario, _ in plays] if ALGORITHMS[settings.algorithm].reads_state else []
