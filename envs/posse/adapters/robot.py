@@ -105,10 +105,8 @@ class Robot:
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
         self._farthest = float(self.layout.bounds()[1][self.layout.offsets["position"]])
-        kept = self.scenario
-        if kept.perfect_radio:  # such a world stores no messages, since they would equal the state
-            kept = kept.replace(radio_loss=_BARELY_LOSSY)
-        self._world = Batch(kept, 1, num_threads=1)
+        lossy = max(self.scenario.radio_loss, _BARELY_LOSSY)  # a perfect radio equals the state, and stores nothing
+        self._world = Batch(self.scenario.replace(radio_loss=lossy), 1, num_threads=1)
         self.reset()
         self.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0))  # compiles, which would halt a control loop
         self.reset()
@@ -122,7 +120,8 @@ class Robot:
         self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
         self._newest: dict[int, int] = {}  # step of each team-mate's last pose and, by the own number, of the last fix
-        self._message = self._sent_message = (0.0,) * self.scenario.message_size
+        self._message = (0.0,) * self.scenario.message_size
+        self._sent: Heard | None = None
 
     @property
     def _me(self) -> Any:
@@ -173,17 +172,17 @@ class Robot:
         messages = [self._checked(message) for message in heard or ()]
         fix = None if target_fix is None else self._checked_fix(target_fix)
 
-        self.steps, self._sent_message = self.steps + 1, self._message
+        self.steps += 1
         world, me = self._world.arrays.world[0], self._me
         world.step = self.steps
-        self._pose = (x, y, heading)
         _place(me, x * self.scale, y * self.scale, heading)
         me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, touched != 0, fix is not None
         for message in messages:
             self._hear(message)
         if fix is not None:
             self._take(fix)
-        self._sent_fix = self._best_fix()  # as a tracker, which sends before it hears
+        # As a tracker, which sends before it hears.
+        self._sent = Heard(self.number, x, y, heading, speed, turn_rate, self._message, self._best_fix())
         for each in messages:
             if each.fix is not None:
                 self._take(each.fix._replace(age=each.fix.age + each.age))
@@ -213,10 +212,9 @@ class Robot:
 
     def broadcast(self) -> Heard:
         """Return what team-mates should hear of it now: its last measurements, and what its policy said before."""
-        if self.steps < 0:
+        if self._sent is None:
             raise ValueError("broadcast before the first observation: call observe() first")
-        motion = float(self._me.speed) / self.scale, float(self._me.turn_rate)
-        return Heard(self.number, *self._pose, *motion, self._sent_message, self._sent_fix)
+        return self._sent
 
     def _best_fix(self) -> TargetFix | None:
         me = self._me
