@@ -49,9 +49,8 @@ class Camera:
         if math.isinf(time) or not 0 <= self._level - level <= 1:  # zoom out at once, and in only by more than a level
             self._level = level
         wanted = least * _LEVEL**self._level
-        if np.isfinite(self._corner).all():  # nothing outside the arena
-            slack = np.maximum(self._corner + _MARGIN - pixels * wanted / 2, 0)
-            middle = np.clip(middle, -slack, slack)
+        slack = np.maximum(self._corner + _MARGIN - pixels * wanted / 2, 0)  # nothing outside the arena
+        middle = np.clip(middle, -slack, slack)
         self.centre = self.centre + (1 - math.exp(-time / _FOLLOW_TIME)) * (middle - self.centre)
         zoom = (1 - math.exp(-time / _ZOOM_TIME)) * math.log(wanted * self.scale)
         reach = np.abs(points - self.centre).max(axis=0) + _MARGIN / 2
