@@ -94,7 +94,7 @@ class PosseEnv(EnvBase):
             raise PolicyError("discrete actions are no velocities: set safeguard or discrete_actions to False")
         self._guard = Guard(self.batch.layout, num_worlds) if safeguard else None
         trackers = self.batch.scenario.num_trackers
-        names = agent_names(self.batch.scenario)[: self.batch.action_shape[1]]
+        names = agent_names(self.batch)
         self._rows = {TRACKERS: slice(0, trackers)}
         if len(names) > trackers:
             self._rows[TARGET] = slice(trackers, None)

@@ -13,17 +13,18 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from posse.engine.arguments import as_float32, real_numbers
+from posse.engine.batch import Batch
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import ScenarioError
 
 MOTIONS: Final = np.array(list(itertools.product((-1, 0, 1), (-1, -0.5, 0, 0.5, 1))), np.float32)
 """The discrete actions, (15, 2): number 5 i + j is speed i (rest, half, full) with turn rate j (right to left)."""
 
 
-def agent_names(scenario: Scenario) -> list[str]:
-    """Return the agents' names in the order of their rows, ``tracker_0`` ..., ``target_0`` last."""
-    names = [f"tracker_{i}" for i in range(scenario.num_trackers)]
-    return names + ["target_0"] * (scenario.num_agents - scenario.num_trackers)
+def agent_names(batch: Batch) -> list[str]:
+    """Return the agents' names in the order of the batch's rows, ``tracker_0`` ..., ``target_0`` last."""
+    trackers = (f"tracker_{i}" for i in range(batch.scenario.num_trackers))
+    return [*trackers, "target_0"][: batch.action_shape[1]]
 
 
 def box(low: npt.ArrayLike, high: npt.ArrayLike) -> spaces.Box:

@@ -58,7 +58,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
         super().__init__(scenario, **settings)
-        self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
+        self.possible_agents = agent_names(self.batch)
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
         self.action_spaces = {
             a: single_action_space(self.scenario.message_size, self._discrete) for a in self.possible_agents
