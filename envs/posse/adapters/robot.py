@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import SENSORS, is_number
-from posse.engine.arguments import MOST_ACTION, real_numbers
+from posse.engine.arguments import as_float32, in_box, real_numbers
 from posse.engine.batch import Batch
 from posse.engine.kernels import START
 from posse.numeric import FloatArray, Records, kernel
@@ -200,10 +200,8 @@ class Robot:
         Raises:
             ValueError: An action of a wrong shape, not finite or outside [-1, 1].
         """
-        numbers = _finite("action", action, (2 + self.scenario.message_size,))
-        if np.abs(numbers).max() > MOST_ACTION:
-            raise ValueError(f"action={action!r} must lie in [-1, 1]")
-        forward, turn, *message = np.clip(numbers, -1.0, 1.0).tolist()
+        numbers = as_float32("action", action, (2 + self.scenario.message_size,)).reshape(1, 1, -1)
+        forward, turn, *message = in_box(numbers, False, "action[{2}]".format)[0, 0].tolist()
         self._message = tuple(message)
         s, turn_rate = self.scenario, turn * self.scenario.tracker_turn_rates[self.number]
         most = s.tracker_speeds[self.number]
