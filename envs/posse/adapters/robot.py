@@ -104,7 +104,6 @@ class Robot:
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
-        self._farthest = float(self.layout.bounds()[1][self.layout.offsets["position"]])
         lossy = max(self.scenario.radio_loss, _BARELY_LOSSY)  # a perfect radio equals the state, and stores nothing
         self._world = Batch(self.scenario.replace(radio_loss=lossy), 1, num_threads=1)
         self.reset()
@@ -161,8 +160,9 @@ class Robot:
                 changed.
         """
         x, y, heading = _finite("pose", pose, (3,))
-        if max(abs(x), abs(y)) * self.scale > self._farthest:
-            inside = f"{self.scenario.name!r} reaches {self._farthest / self.scale:.3g} m from its middle"
+        farthest = (self.scenario.position_bound + self.scenario.drift_bound) / self.scale
+        if max(abs(x), abs(y)) > farthest:
+            inside = f"{self.scenario.name!r} reaches {farthest:.3g} m from its middle"
             warnings.warn(f"the pose lies outside: {inside}; check the frame, the unit and scale", stacklevel=2)
         speed, turn_rate, touched = _finite("speed, turn_rate and touching", (speed, turn_rate, touching), (3,))
         beams = self.scenario.sonar_beams
