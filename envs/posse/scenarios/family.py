@@ -82,8 +82,7 @@ class Family:
         shares = np.random.default_rng(key).random(len(self.ranges))
         values: dict[str, float] = {}
         for (name, (low, high)), share in zip(self.ranges, shares.tolist(), strict=True):
-            steps = isinstance(low, int) and isinstance(high, int)
-            values[name] = low + int(share * (high - low + 1)) if steps else low + share * (high - low)
+            values[name] = low + (int(share * (high - low + 1)) if isinstance(low, int) else share * (high - low))
         return self.base.replace(**values)
 
     def replace(self, **changes: Any) -> "Family":
@@ -134,10 +133,8 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
         base = Family(name=base, base=get_scenario(start), ranges=tuple(ranges.items()), meaning=meaning)
     ranges, rest, kinds = dict(base.ranges) if isinstance(base, Family) else {}, {}, Scenario.settings()
     for setting, value in settings.items():
-        if isinstance(value, np.ndarray):
-            value = value.tolist()
         of_several = setting in kinds and kinds[setting].kind.startswith(("tuple", "Mapping"))
-        if isinstance(value, (tuple, list)) and not of_several:
+        if isinstance(value, (tuple, list, np.ndarray)) and not of_several:
             ranges[setting] = tuple(value)
         else:
             ranges.pop(setting, None)
