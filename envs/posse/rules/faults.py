@@ -34,7 +34,6 @@ def draw_faults(c: Record, w: Record, trackers: Records) -> None:
     """Draw the faults of an episode."""
     for t in trackers:
         t.broken_at = NEVER
-        t.sensor_dead_from, t.radio_dead_from = NEVER, NEVER
     w.breaks_left, w.break_step = c.breaks, NEVER
     draw_coming_faults(c, w, trackers, 0, 0)
 
