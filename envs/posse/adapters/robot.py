@@ -166,8 +166,8 @@ class Robot:
             warnings.warn(f"the pose lies outside: {inside}; check the frame, the unit and scale", stacklevel=2)
         speed, turn_rate, touched = _finite("speed, turn_rate and touching", (speed, turn_rate, touching), (3,))
         beams = self.scenario.sonar_beams
-        readings = None if sonar is None else real_numbers("sonar", sonar).astype(np.float64)
-        if readings is not None and (readings.shape != (beams,) or not readings.min(initial=0.0) >= 0.0):
+        readings = np.full(beams, np.inf) if sonar is None else real_numbers("sonar", sonar).astype(np.float64)
+        if readings.shape != (beams,) or not readings.min(initial=0.0) >= 0.0:
             raise ValueError(f"sonar={sonar!r} must be {beams} distances of at least 0 m")
         messages = [self._checked(message) for message in heard or ()]
         fix = None if target_fix is None else self._checked_fix(target_fix)
@@ -186,12 +186,9 @@ class Robot:
         for each in messages:
             if each.fix is not None:
                 self._take(each.fix._replace(age=each.fix.age + each.age))
-        row: FloatArray = self._world.observe()[0, self.number].copy()
+        row: FloatArray = self._world.observe()[0, self.number]
         if beams:
-            reach = self.scenario.sonar_range
-            row[self.layout.offsets["sonar"] :][:beams] = (
-                reach if readings is None else np.minimum(readings * self.scale, reach)
-            )
+            row[self.layout.offsets["sonar"] :][:beams] = np.minimum(readings * self.scale, self.scenario.sonar_range)
         return row
 
     def command(self, action: npt.ArrayLike) -> Command:
