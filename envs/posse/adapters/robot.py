@@ -177,15 +177,12 @@ class Robot:
         world.step = self.steps
         _place(me, x * self.scale, y * self.scale, heading)
         me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, touched != 0, fix is not None
-        for message in messages:
-            self._hear(message)
         if fix is not None:
             self._take(fix)
         # As a tracker, which sends before it hears.
         self._sent = Heard(self.number, x, y, heading, speed, turn_rate, self._message, self._best_fix())
-        for each in messages:
-            if each.fix is not None:
-                self._take(each.fix._replace(age=each.fix.age + each.age))
+        for message in messages:
+            self._hear(message)
         row: FloatArray = self._world.observe()[0, self.number]
         if beams:
             row[self.layout.offsets["sonar"] :][:beams] = np.minimum(readings * self.scale, self.scenario.sonar_range)
@@ -273,7 +270,7 @@ class Robot:
         _keep(self._world._fixed.config, trackers, self.number, new, fix.frame is None)
 
     def _hear(self, message: Heard) -> None:
-        """Store a message, unless a later one of the same team-mate was heard."""
+        """Store a message, unless a later one of the same team-mate was heard, and take its fix."""
         arrays, step = self._world.arrays, self._step_of(message.number, message.age)
         heard = arrays.heard[0, self.number, message.number]
         if step is not None:
@@ -281,6 +278,8 @@ class Robot:
             _place(heard, message.x * self.scale, message.y * self.scale, message.heading)
             heard.speed, heard.turn_rate = message.speed * self.scale, message.turn_rate
             arrays.heard_message[0, self.number, message.number] = message.message or 0.0
+        if message.fix is not None:
+            self._take(message.fix._replace(age=message.fix.age + message.age))
 
 
 @kernel
