@@ -156,7 +156,7 @@ def test_the_table_of_the_readme_is_made_from_the_result_files(hook: Callable[[s
     assert gain.sub("", made) == gain.sub("", README)
     # For a gain the tuned script plays again, and another processor rounds otherwise.
     gains = ([float(number) for number in gain.findall(text)] for text in (made, README))
-    assert next(gains) == pytest.approx(next(gains), abs=0.005)
+    assert next(gains) == pytest.approx(next(gains), abs=0.02)
 
 
 def test_teams_are_ranked_by_the_safe_score(
