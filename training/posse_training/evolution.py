@@ -46,11 +46,10 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
     The run folder holds the scores of all candidates: the search follows from its seed and these.
     """
-    require("training", "cmaes")
     from cmaes import SepCMA
 
     s, basis = settings, _basis(settings)
-    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
+    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"), alone=False)  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
         with intact(folder / STATE):
@@ -102,7 +101,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
 
 
 def check_adviser(settings: TrainSettings) -> None:
-    """Raise PolicyError if the script that a run corrects cannot be an adviser."""
+    """Raise PolicyError if the script that a run corrects cannot be an adviser, MissingExtraError without cmaes."""
+    require("training", "cmaes")
     Candidates(settings, np.zeros_like(_basis(settings)[:1]))
 
 

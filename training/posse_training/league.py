@@ -23,7 +23,7 @@ from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.registry import is_code
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
-from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.evaluation import evaluate, played_errors
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked, write_csv
@@ -251,7 +251,10 @@ class League:
 
     def _play(self, team: Member, target: Member, episodes: int, seed: int, split: str) -> Results:
         self.console.print(f"playing {team.label} against {target.label}", markup=False)
-        return evaluate(team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False)
+        with played_errors():
+            return evaluate(
+                team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False
+            )
 
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
@@ -266,6 +269,9 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         met = len(others) + settings.generations  # by the last member of the side
         if first.num_worlds < (most := met + _SHARES + met // 2):  # parts, as shares() rounds them
             raise SettingsError(f"num_worlds={first.num_worlds} is too few for {met} opponents in the end: use {most}")
+    if any(found._members(side, settings.generations + 1)[-1].trained for side in (TARGET, TEAM)):
+        less = f"generations={settings.generations} is less than {settings.path} has"
+        raise SettingsError(f"{less}: raise it, or choose another --out")
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))
