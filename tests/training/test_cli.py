@@ -1,6 +1,7 @@
 """The command line: fast start, clear errors."""
 
 import json
+import os
 import shlex
 from pathlib import Path
 
@@ -40,6 +41,14 @@ def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -
     assert f"usage: posse {name}" in capsys.readouterr().out
 
 
+def test_a_reader_may_go_and_names_may_be_no_utf_8(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    os.close((pipe := os.pipe())[0])
+    for file, words in ((pipe[1], "--help"), (tmp_path / "out", f"replay idle --out {tmp_path}/\udcff.html")):
+        with open(file, "w", encoding="utf-8") as out:  # noqa: PTH123
+            monkeypatch.setattr("sys.stdout", out)
+            assert main(words.split()) == 0
+
+
 INVALID = {
     "--import nosuch scenarios": "posse: --import nosuch: ModuleNotFoundError",
     "comprae": "unknown command 'comprae': did you mean 'compare'?",
@@ -70,6 +79,7 @@ INVALID = {
     "compare idle mine=": "'mine=' is not a group of policies",
     "compare two=idle,idle": "'two=idle,idle' names a policy twice",
     "compare idle idle=pursuit": "two policies have the label 'idle'",
+    "compare \udcff=idle": "the label '\\udcff' is no UTF-8: give another one",
     "compare idle --scenario constant konstant": "unknown scenario 'konstant'",
     "compare idle --scenario --episodes 2": "no scenario is given",
     "compare idle --set name=mine": "unknown setting 'name'",
@@ -106,6 +116,7 @@ INVALID = {
     "train --algorithm cmaes --encoding plain": "leaves cmaes nothing to read",
     "train --algorithm cmaes --start runs/a": "start='runs/a' does not go with cmaes",
     "train --algorithm cmaes --side target": "corrects no script: use ppo",
+    "train --side target --team idle --num-worlds 1 --rollout 1": "a rollout of 1 row is too short to learn from",
     "train --advise ddcs-distributed": "needs algorithm cmaes, not ppo",
     "train --team idle": "team='idle' is of the side that learns, side='trackers'",
     "train --side target --team None": "set team",

@@ -6,6 +6,7 @@ Each command is imported when it is called: listing the scenarios does not impor
 import argparse
 import difflib
 import importlib
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -46,6 +47,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: success; 1: part of the work failed, as the output says; 2: an error that the user can correct; 130: interrupted.
     """
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="surrogateescape")  # names of files may be no UTF-8
+    try:
+        try:
+            return _run(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # what reads the output, such as head, has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser("posse", "posse COMMAND ... [--import MODULE]", add_help=False, allow_abbrev=False)
     parser.add_argument("--import", dest="modules", action="append", default=[])
     known, given = parser.parse_known_args(arguments)
@@ -88,11 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from posse import DeclarationError, ScenarioError
         from posse_baselines import PolicyError
 
-        if not isinstance(error, (UserError, ScenarioError, DeclarationError, PolicyError, OSError)):
+        told = (UserError, ScenarioError, DeclarationError, PolicyError, OSError)
+        if isinstance(error, BrokenPipeError) or not isinstance(error, told):
             raise
-        if isinstance(error, BrokenPipeError):  # what reads the output, such as head, has read enough
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
         print(f"posse {name}: {error}", file=sys.stderr)
         return 2
 

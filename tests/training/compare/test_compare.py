@@ -16,6 +16,7 @@ from tests.support.learned import policy_for, target_for
 import posse
 from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
+from posse_baselines.files import from_json
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
@@ -104,8 +105,11 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
     assert found.rows[1]["difference"] == difference(scores, reference)
     better = (scores > reference) + 0.5 * (scores == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
+    twice = f"{tmp_path}/../{tmp_path.name}/0.safetensors"
+    with pytest.raises(PolicyError, match="is given twice"):
+        read_contenders((files[0], twice))
     with pytest.raises(PolicyError, match="names a policy twice"):
-        compare(CompareSettings((f"two={files[0]},{tmp_path}/../{tmp_path.name}/0.safetensors",), ("constant",), 1))
+        compare(CompareSettings((f"two={files[0]},{twice}",), ("constant",), 1))
 
 
 def test_a_policy_that_cannot_play_is_left_out_with_a_line(
@@ -156,12 +160,10 @@ def test_a_folder_with_any_file_is_refused_and_left_alone(tmp_path: Path) -> Non
             compare(CompareSettings(("idle",), ("constant",), out=out))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
     with locked(tmp_path / "busy"):
-        for play in (
-            lambda out: compare(CompareSettings(("idle",), ("constant",), out=out)),
-            lambda out: submit("idle", out),
-        ):
-            with pytest.raises(RunFolderError, match=r"process \d+ uses"):
-                play(tmp_path / "busy")
+        with pytest.raises(RunFolderError, match=r"process \d+ uses"):
+            compare(CompareSettings(("idle",), ("constant",), out=tmp_path / "busy"))
+        with pytest.raises(RunFolderError, match=r"process \d+ uses"):
+            submit("idle", tmp_path / "busy")
 
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -187,9 +189,9 @@ def test_an_evaluation_is_the_same_alone_and_its_files_name_target_and_settings(
     rows = [*csv.DictReader((tmp_path / "deep" / "rows.csv").read_text(encoding="utf-8").splitlines())]
     assert [(row["world"], row["target"]) for row in rows] == [(str(world), "evading") for world in range(5)]
     assert [float(row["score"]) for row in rows] == list(many["score"])
-    settings = json.loads((tmp_path / "deep" / "rows.json").read_text())
+    settings = json.loads((tmp_path / "deep/rows.json").read_text(), parse_constant=pytest.fail, object_hook=from_json)
     assert (settings["target"], settings["seed"], settings["split"]) == ("evading", 9, "test")
-    assert settings["scenario"]["horizon"] == 30
+    assert (settings["scenario"]["horizon"], settings["scenario"]["arena"]) == (30, np.inf)
 
 
 def test_a_comparison_plays_every_team_against_the_target(file: Path, tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ plays in a process of its own, which is ended at the time limit. That is no sand
 
 import contextlib
 import itertools
-import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
@@ -22,6 +21,7 @@ from posse import Batch, Family, Scenario, scenario_names
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, load_target
 from posse_baselines.fields import number
+from posse_baselines.files import write_json
 from posse_baselines.registry import is_code
 from posse_training.compare.contenders import PLANNER, Contender, Plays, check_code, read_contenders
 from posse_training.compare.table import Row, row_of, table, write_marl_eval
@@ -251,7 +251,7 @@ class Comparison:
         about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
         about["changed"] = s.overrides
         about |= {"comparison": rows, "left_out": self.left_out, "failed": self.failed}
-        (self.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+        write_json(self.folder / SUMMARY, about)
         if s.figures:
             self._report()
 
@@ -311,7 +311,7 @@ class Comparison:
             replays=shown,
             problems={"Left out": self.left_out, "Failed": self.failed},
         )
-        (self.folder / REPORT).write_text(text, encoding="utf-8")
+        (self.folder / REPORT).write_text(text, encoding="utf-8", errors="replace")
 
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""

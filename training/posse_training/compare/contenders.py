@@ -43,13 +43,13 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     own, and code that fails there fails later, where it is to play.
 
     Raises:
-        PolicyError: No contender, a policy that cannot be loaded, a group without files or with one twice, or a label
-            that two contenders share, or that is the planner's.
+        PolicyError: No contender, a policy that cannot be loaded, a group without files or with one twice, one that is
+            given twice without labels, or a label that two contenders share, that is the planner's, or no UTF-8.
     """
     if not texts:
         raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
     found: list[Contender] = []
-    stated = {text.partition("=")[0] for text in texts}
+    stated, alone = {text.partition("=")[0] for text in texts}, set[str]()
     for text in texts:
         label, sign, members = (text, "", "") if is_file(text) else text.partition("=")
         if sign and not (label and all(members.split(","))):
@@ -59,8 +59,12 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
             who = "the reference and another policy" if label == PLANNER else "two policies"
             raise PolicyError(f"{who} have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
-        if len({os.path.realpath(name) if is_file(name) else name for name in names}) < len(names):
+        places = {os.path.realpath(name) if is_file(name) else name for name in names}
+        if len(places) < len(names):
             raise PolicyError(f"{text!r:.120} names a policy twice: give each training seed once")
+        if not sign and places & alone:
+            raise PolicyError(f"{text!r:.120} is given twice: leave it out once, or give it a label, LABEL=...")
+        alone |= set() if sign else places
         policies = tuple(name if is_code(name) else load(name) for name in names)
         for name in filter(is_code, names):
             with contextlib.suppress(PlayError):
@@ -68,6 +72,8 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
         if not sign and not isinstance(policies[0], str) and is_file(text):
             name = policies[0].name
             label = name if name not in taken | stated | {PLANNER} else label
+        if label.encode(errors="replace").decode() != label:  # figures cannot show it
+            raise PolicyError(f"the label {label!r:.120} is no UTF-8: give another one, LABEL=...")
         found.append(Contender(label, policies))
     return tuple(found)
 

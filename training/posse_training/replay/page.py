@@ -81,7 +81,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
     check_page(path := Path(path))
     text = page(replay)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, text.encode())
+    write_atomically(path, text.encode(errors="replace"))  # names of files may be no UTF-8
     return path
 
 
