@@ -4,6 +4,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from posse.declarations import unknown
 
 
@@ -65,7 +67,8 @@ def changed(settings: Any, values: Mapping[str, Any]) -> Any:
     for name in values:
         if name not in names:
             raise ValueError(unknown("setting", name, names))
-    return dataclasses.replace(settings, **values)
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+    return dataclasses.replace(settings, **plain)
 
 
 def tunables(settings: Any) -> tuple[Tunable, ...]:

@@ -41,8 +41,11 @@ class TunedDDCS(DDCS):
         self.card: Mapping[str, Any] = card or {}
 
     def settings_for(self, scenario: Scenario) -> Settings:
-        """Return the settings that are played on a scenario."""
-        return replace(self.settings if self.card else tuned_settings(self.name, scenario), **self._changes)
+        """Return the settings that are played on a scenario; PolicyError if what was changed does not go with them."""
+        try:
+            return replace(self.settings if self.card else tuned_settings(self.name, scenario), **self._changes)
+        except ValueError as error:
+            raise PolicyError(f"settings of {self.name!r} on {scenario.name!r}: {error}") from error
 
 
 def tuned_settings(name: str, scenario: Scenario) -> Settings:

@@ -56,14 +56,15 @@ def test_no_robot_alone_plays_the_model_of_a_team() -> None:
     ends = np.float32(0.0), np.float32(1.0)
     scaled = PPO("MlpPolicy", gymnasium.wrappers.RescaleAction(gymnasium.make("posse/Team-v0"), *ends), device="cpu")
     thirds = DQN("MlpPolicy", gymnasium.wrappers.DiscretizeAction(gymnasium.make("posse/Solo-v0"), 3), buffer_size=10)
-    wrong: Any
+    wrong: dict[str, Any]
     for wrong, message in (
-        (scaled, "on those of posse"),
-        (thirds, "on those of posse"),
-        ("solo.zip", r"PPO\.load\(path\)"),
+        ({"model": scaled}, "on those of posse"),
+        ({"model": thirds}, "on those of posse"),
+        ({"model": "solo.zip"}, r"PPO\.load\(path\)"),
+        ({"model": model, "normalize": "x.pkl"}, r"normalize='x\.pkl' is no VecNormalize"),
     ):
         with pytest.raises(PolicyError, match=message):
-            from_sb3(wrong)
+            from_sb3(**wrong)
 
 
 @pytest.mark.parametrize("safeguard", [False, True])

@@ -50,7 +50,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         whole_team: Whether one observation is that of all trackers, so that no robot can play it alone.
 
     Raises:
-        PolicyError: Spaces that no environment of posse has; no model.
+        PolicyError: Spaces that no environment of posse has; no model, or no wrapper.
     """
 
     def __init__(
@@ -67,6 +67,8 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
             raise PolicyError(f"{model!r:.80} is no model: load the file by its class, PPO.load(path)")
         self.model, self.message_size = model, check_count("message_size", message_size, 0)
         self.name = name or type(model).__name__
+        if not isinstance(normalize, (VecNormalize, type(None))):
+            raise PolicyError(f"normalize={normalize!r:.80} is no VecNormalize: load it, VecNormalize.load(path, envs)")
         self._encoding, self._safeguard = encoding, safeguard
         self._normalize = normalize or model.get_vec_normalize_env()
         shape = model.observation_space.shape

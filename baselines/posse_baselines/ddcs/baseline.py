@@ -88,7 +88,8 @@ class DDCS(BasePolicy):
     def with_settings(self, **values: Any) -> Self:
         """Return a policy with some settings changed; ValueError for an unknown one, or a value out of its range."""
         other = copy.copy(self)
-        other.settings, other._changes = changed(self.settings, values), {**self._changes, **values}
+        other.settings = changed(self.settings, values)
+        other._changes = {**self._changes, **{name: getattr(other.settings, name) for name in values}}
         return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:

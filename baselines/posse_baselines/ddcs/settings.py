@@ -105,6 +105,6 @@ class Settings:
 
     def __post_init__(self) -> None:
         check(self)
-        for transition in self.forbidden:
-            if transition not in TRANSITIONS:
-                raise ValueError(f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}")
+        given: object = self.forbidden
+        if not isinstance(given, (tuple, list)) or any(transition not in TRANSITIONS for transition in given):
+            raise ValueError(f"forbidden={given!r:.80} must be a tuple of some of: {', '.join(TRANSITIONS)}")

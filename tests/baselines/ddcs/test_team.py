@@ -23,7 +23,8 @@ from posse_baselines.policy import Memory
         ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
         ({"radio": "no"}, "radio='no' must be True or False"),
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
-        ({"forbidden": ("flocking>flocking",)}, "forbidden='flocking>flocking' is unknown"),
+        ({"forbidden": ("flocking>flocking",)}, r"forbidden=\('flocking>flocking',\) must be a tuple of some of"),
+        ({"forbidden": 3}, "forbidden=3 must be a tuple"),
     ],
 )
 def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:
@@ -33,10 +34,13 @@ def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) 
 
 def test_a_changed_policy_is_of_the_same_kind() -> None:
     policy: Any = load("belief-planner")
-    changed = policy.with_settings(near=0.5)
+    changed = policy.with_settings(near=np.float32(0.5))
     assert (type(changed), changed.settings_for(posse.get_scenario("smart")).near) == (type(policy), 0.5)
     with pytest.raises(ValueError, match=r"unknown setting 'alpha'.*did you mean 'alpha_2'"):
         policy.with_settings(alpha=1.0)
+    policy = load("pngl-l-phi-tuned")
+    with pytest.raises(PolicyError, match=r"settings of 'pngl-l-phi-tuned' on 'leader-loss': near=.* below far=1\.3"):
+        policy.with_settings(far=1.3).settings_for(posse.get_scenario("leader-loss"))
 
 
 def test_both_ends_of_each_range_can_be_played() -> None:
