@@ -31,7 +31,7 @@ def test_first_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     policy = load(folder / "best.safetensors")
     assert policy.name == "smart-ppo-1"
     assert left["file"] == folder / "best.safetensors"
-    shown = re.findall(rf"^(\S+) +{NUMBER} \[", capsys.readouterr().out, re.MULTILINE)
+    shown = re.findall(rf"^(\S+) +{NUMBER}(?: \[|$)", capsys.readouterr().out, re.MULTILINE)
     assert [name for name, _ in shown] == ["pursuit", "ddcs-distributed", "smart-ppo-1"]
     mine = evaluate(policy, "smart", episodes=2, progress=False)["score"].mean()
     assert float(shown[2][1]) == pytest.approx(mine, abs=1e-3)
