@@ -8,11 +8,9 @@ import pytest
 from tests.support.drive import drive
 
 import posse
-from posse.numeric import FloatArray
 from posse_baselines import DDCS, PolicyError, begin, load, play, rollout, tunables
 from posse_baselines.ddcs import SEARCHING, Settings
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.policy import Memory
 
 
 @pytest.mark.parametrize(
@@ -131,23 +129,10 @@ def test_late_commands_and_drifting_poses_cost_the_team_little(name: str, fault:
     assert (metrics["contact_free"] == 0).mean() <= 0.02
 
 
-class Blinded(DDCS):
-    """A team whose sensors fail after 40 s."""
-
-    steps = 0
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        self.steps += 1
-        seen = observations.copy()
-        if self.steps > 400:
-            views = memory.layout.views(seen)
-            views["target_known"][...], views["target_seen"][...] = 0.0, 0.0
-        return super().act(seen, memory)
-
-
 def test_on_the_open_plane_a_lost_target_is_searched_for_where_it_was_lost() -> None:
-    pose: dict[str, Any] = {"tracker_pose": [(5.0, 0.0, 0.0)], "target_pose": (8.0, 0.0, 0.0), "num_trackers": 1}
-    run = drive(Blinded(), "constant", 1, 1000, **pose)
+    start: dict[str, Any] = {"tracker_pose": [(5.0, 0.0, 0.0)], "target_pose": (8.0, 0.0, 0.0), "num_trackers": 1}
+    start |= {"sensor_outages": 1.0, "outage_time": 100.0, "horizon": 2000}
+    run = drive("ddcs-distributed", "constant", 1, 2000, **start)
     places = np.array([now.tracker[0, 0, :2] for now in run if (now.notes["task"] == SEARCHING).all()])
     assert len(places) > 400
     assert places[0, 0] > 25.0
