@@ -51,18 +51,6 @@ def test_converging_and_flocking_change_with_hysteresis() -> None:
     assert (task == FLOCKING).mean() > 0.95
 
 
-def test_converging_is_at_full_speed_and_flocking_at_the_formations() -> None:
-    converging, flocking = [], []
-    for step, now in enumerate(drive("pngl-l-phi", "constant", 20, 300, split="train")):
-        speed, task = now.commands[..., 0], now.notes["task"]
-        if step > 60:  # by then all have turned round
-            converging.append(speed[task == CONVERGING])
-        if step > 250:
-            flocking.append(speed[task == FLOCKING])
-    assert np.quantile(np.concatenate(converging), 0.2) > 0.95  # the safeguard slows some
-    assert np.median(np.concatenate(flocking)) == pytest.approx(0.6, abs=0.01)
-
-
 def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> None:
     # Rule iv of section 3.5: it sees neither the target nor its place, and is told by radio.
     pose = [(-1.2, 0.0, 0.0), (-2.05, 0.85, 0.0), (-11.0, 2.0, 0.3)]
