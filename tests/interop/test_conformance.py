@@ -1,6 +1,5 @@
 """The checkers of other libraries find every registered scenario sound, and variants with other settings."""
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -35,19 +34,20 @@ def types_of(info: dict[str, Any]) -> dict[str, Any]:
     return {key: (type(value), np.shape(value), np.asarray(value).dtype) for key, value in info.items()}
 
 
-def all_at_once(settings: Settings) -> None:
+@pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL", "ignore:Environment's m:UserWarning")
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_environments_of_many_agents_conform(variant: str) -> None:
+    settings = VARIANTS[variant]
     parallel_api_test(parallel(settings), num_cycles=100)
     parallel_seed_test(lambda: parallel(settings))
-
-
-def in_turns(settings: Settings) -> None:
     api_test(posse.env(**settings, horizon=40), num_cycles=100)
     seed_test(lambda: posse.env(**settings), num_cycles=20)
+    check_env_specs(PettingZooWrapper(parallel(settings), return_state=True))
 
 
-def spaces_and_infos(settings: Settings) -> None:
-    """What is returned lies in its spaces over an episode, and an info has the same keys and types at every step."""
-    env = parallel(settings)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_is_returned_lies_in_its_spaces_and_infos_keep_their_keys_and_types(variant: str) -> None:
+    env = parallel(VARIANTS[variant])
     seen, infos = env.reset(seed=1)
     types = types_of(infos["tracker_0"])
     assert types.keys() - {"working"} == KEYS
@@ -60,20 +60,6 @@ def spaces_and_infos(settings: Settings) -> None:
             return
         seen, rewards, *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
         assert np.isfinite(list(rewards.values())).all()
-
-
-def wrapped_by_torchrl(settings: Settings) -> None:
-    check_env_specs(PettingZooWrapper(parallel(settings), return_state=True))
-
-
-CHECKS: tuple[Callable[[Settings], None], ...] = (all_at_once, in_turns, spaces_and_infos, wrapped_by_torchrl)
-
-
-@pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL", "ignore:Environment's m:UserWarning")
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("check", CHECKS)
-def test_environments_of_many_agents_conform(check: Callable[[Settings], None], variant: str) -> None:
-    check(VARIANTS[variant])
 
 
 def test_an_environment_in_turns_can_draw() -> None:
