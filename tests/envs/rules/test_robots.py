@@ -3,20 +3,13 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.envs.engine.test_batch import played
 from tests.support.reference.state import NEVER, directions, points
 
 import posse
-from posse import Batch
-
-
-def drive(batch: Batch, steps: int, seed: int = 0) -> npt.NDArray[np.float32]:
-    """Return the observations of random actions, (steps, E, N, F)."""
-    rng = np.random.default_rng(seed)
-    return np.stack([batch.step(rng.uniform(-1, 1, batch.action_shape))[0] for _ in range(steps)])
 
 
 def test_speed_and_turn_rate_follow_the_command_with_the_lag() -> None:
@@ -47,9 +40,10 @@ def test_commands_are_executed_after_the_delay() -> None:
 def test_no_wheel_turns_faster_than_the_greatest_speed(seed: int, lag: float, acceleration: float) -> None:
     batch = posse.batch("field", 2, wheel_base=0.6, actuator_lag=lag, tracker_acceleration=acceleration)
     batch.reset(seed=seed)
-    for step in range(30):
+    rng = np.random.default_rng(seed)
+    for _ in range(30):
         before = batch.arrays.tracker["speed"].copy()
-        drive(batch, 1, seed + step)
+        batch.step(rng.uniform(-1, 1, batch.action_shape))
         after, free = batch.arrays.tracker, batch.working & (batch.arrays.tracker["touching"] == 0)
         assert (np.abs(after["speed"] - before)[free] <= acceleration * batch.scenario.control_step + 1e-5).all()
         wheel = after["speed"] + 0.3 * np.abs(after["turn_rate"])
@@ -66,13 +60,12 @@ def test_a_robot_that_turns_as_fast_as_its_wheels_can_stands() -> None:
 
 
 def test_own_poses_drift_as_random_walks() -> None:
-    batch = posse.batch("constant", 300, odometry_drift=0.1, heading_drift=0.03)
-    batch.reset()
-    v = batch.layout.views(drive(batch, 100))
-    turned = np.angle(v["heading"][-1] @ [1, 1j] / directions(batch, "tracker"))
+    batch = played("constant", 300, steps=100, odometry_drift=0.1, heading_drift=0.03)
+    v = batch.layout.views(batch.observe())
+    turned = np.angle(v["heading"] @ [1, 1j] / directions(batch, "tracker"))
     for error, wanted in (
-        (v["position"][-1, ..., 0] - batch.state["tracker_x"], 0.1),
-        (v["position"][-1, ..., 1] - batch.state["tracker_y"], 0.1),
+        (v["position"][..., 0] - batch.state["tracker_x"], 0.1),
+        (v["position"][..., 1] - batch.state["tracker_y"], 0.1),
         (turned, 0.03),
     ):
         assert np.std(error) == pytest.approx(wanted * math.sqrt(10.0), rel=0.1)
@@ -80,9 +73,8 @@ def test_own_poses_drift_as_random_walks() -> None:
 
 
 def test_what_a_robot_reports_is_placed_by_its_believed_pose() -> None:
-    batch = posse.batch("constant", 20, odometry_drift=0.2, heading_drift=0.1)
-    batch.reset()
-    v, true = batch.layout.views(drive(batch, 50)[-1]), directions(batch, "tracker")
+    batch = played("constant", 20, steps=50, odometry_drift=0.2, heading_drift=0.1)
+    v, true = batch.layout.views(batch.observe()), directions(batch, "tracker")
     own, known = v["position"] @ [1, 1j], v["heading"] @ [1, 1j]
     # Team-mates are where they say that they are.
     others = own[..., None] + v["neighbour_range"] * (v["neighbour_bearing"] @ [1, 1j]) * known[..., None]
