@@ -9,7 +9,6 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from tests.support.attack import same
 
-import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 from posse.adapters.vector_env import TeamVectorEnv
 
@@ -62,12 +61,6 @@ def test_the_vector_environment_agrees_with_gymnasiums(name: str, discrete: bool
             assert same(*again)
     assert terminations > 0
     assert truncations > 0
-
-
-def test_settings_of_others_are_named_with_their_own() -> None:
-    for other, own in (("num_worlds", "num_envs"), ("max_episode_steps", "horizon")):
-        with pytest.raises(posse.ScenarioError, match=f"{other}= is not known here: it is {own}="):
-            vector("posse/Team-v0", **{other: 2})
 
 
 def test_every_world_is_drawn() -> None:

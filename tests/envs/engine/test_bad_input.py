@@ -46,6 +46,8 @@ OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
         ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
         ("solo vector", {"scenario": "leader-loss"}, "breaks=1 of the .* pass breaks=0, or use posse/Team-v0"),
         ("team vector", {"num_envs": 2.5}, rf"num_envs=2\.5 {WHOLE} \[1, "),
+        ("team vector", {"num_worlds": 2}, "num_worlds= is not known here: it is num_envs="),
+        ("team vector", {"max_episode_steps": 2}, "max_episode_steps= is not known here: it is horizon="),
     ],
     ids=lambda part: str(part)[:60],
 )
