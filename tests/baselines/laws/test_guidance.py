@@ -13,7 +13,6 @@ from tests.support.reference.state import on_arc
 
 from posse_baselines.ddcs.memory import record
 from posse_baselines.laws import formation, guidance
-from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.guidance import BODY, line_of_sight, regulate
 from posse_baselines.laws.safeguard import DISC, put_disc, turn_past
 from posse_baselines.laws.steering import WORK_ROWS, approach_velocity, assign, slot_heading, slot_velocity, way_round
@@ -43,16 +42,6 @@ def test_bearing_rate_is_the_derivative_of_the_bearing(
     rate = guidance.bearing_rate(r, cmath.rect(target_speed, target_theta - sigma), cmath.rect(speed, theta - sigma))
     step = 1e-5
     assert rate == pytest.approx(cmath.phase(gap(step) / gap(-step)) / (2 * step), abs=1e-7)
-
-
-@given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES)
-def test_the_general_law_is_k_sigma_plus_c(sigma: float, k: float, wanted_sigma: float, psi: float) -> None:
-    away = short_way(sigma - wanted_sigma)
-    assume(abs(away) < math.pi - 1e-6)
-    sigma = wanted_sigma + away  # on the same turn as the wanted one
-    c = psi - k * wanted_sigma
-    heading = guidance.lawful_heading(wrap(sigma), k, wanted_sigma, psi)
-    assert short_way(heading - (k * sigma + c)) == pytest.approx(0.0, abs=1e-9)
 
 
 @given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES, st.floats(-1, 1), st.floats(-1, 1))
