@@ -1,6 +1,7 @@
 """Frames: what is drawn where; the window of the mode "human": pause, one step, speed, close; in anybody's loop."""
 
 import threading
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +18,8 @@ Frame = npt.NDArray[np.uint8]
 SIZE = (400, 360)
 
 
-def frame_of(renderer: Renderer, batch: posse.Batch) -> Frame:
-    frame = renderer.draw(batch)
+def frame_of(renderer: Renderer, batch: posse.Batch, **settings: Any) -> Frame:
+    frame = renderer.draw(batch, **settings)
     assert frame is not None
     return frame
 
@@ -54,8 +55,7 @@ def test_robots_and_slots_are_drawn_where_they_are() -> None:
     poses = [(5, 0, 1.57), (-1.2, 0, 0)]  # the second in the wedge's first slot, 1.2 m behind the target
     batch.reset(options={"tracker_pose": poses, "target_pose": (0, 0, 0)})
     renderer = Renderer(batch.scenario, size=(900, 800))
-    frame = renderer.draw(batch, colours=[TRACKER, (0, 0, 255)])
-    assert frame is not None
+    frame = frame_of(renderer, batch, colours=[TRACKER, (0, 0, 255)])
     assert_colour(renderer, frame, (5.07, -0.07), TRACKER)
     assert_colour(renderer, frame, (-1.22, 0.06), (0, 0, 255))
     assert_colour(renderer, frame, (-0.05, 0.05), TARGET)
@@ -114,9 +114,7 @@ def test_a_window_shows_the_frame_above_a_line_with_its_keys() -> None:
     surface = pygame.display.get_surface()
     assert surface is not None
     shown = pygame.surfarray.array3d(surface).swapaxes(0, 1)
-    frame = Renderer(batch.scenario, size=(400, 300)).draw(batch)
-    assert frame is not None
-    np.testing.assert_array_equal(shown[:300], frame)
+    np.testing.assert_array_equal(shown[:300], frame_of(Renderer(batch.scenario, size=(400, 300)), batch))
     assert (shown[300:] < 200).any()
     renderer.close()
     assert not pygame.display.get_init()
