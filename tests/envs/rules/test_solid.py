@@ -16,6 +16,7 @@ from tests.support.reference.state import Complexes, directions, on_arc, one_wor
 
 import posse
 from posse.rules import arc
+from posse_baselines import load, rollout
 
 TOLERANCE = 1e-4  # m
 CROWDED: dict[str, Any] = {
@@ -160,11 +161,7 @@ def test_a_step_lies_on_the_circle(theta: float, speed: float, turn: float, time
 
 def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
     batch = posse.batch(num_worlds=64, num_trackers=3, horizon=10_000, arena=400.0, start_distance=(50.0, 90.0))
-    batch.reset(seed=1)
-    rng = np.random.default_rng(1)
-    several = rng.uniform(-1, 1, (16, *batch.action_shape)).astype(np.float32)
-    for k in range(10_000):
-        batch.step(several[k % 16])
+    rollout(batch, load("random"), seed=1)
     state = batch.state
     for name in ("tracker_heading", "world_heading", "world_frame"):
         length = np.hypot(state[f"{name}_cos"].astype(float), state[f"{name}_sin"])
