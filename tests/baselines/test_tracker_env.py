@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import PolicyError, begin, load
+from posse_baselines import PolicyError, batch_for, load, rollout
 from posse_baselines.tracker_env import TrackerEnv, register
 
 
@@ -17,17 +17,15 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
     policy = load("pursuit")
     env = TrackerEnv("smart", number=2, teammates=policy, seed=5, horizon=40)
     own, _ = env.reset()
-    batch = posse.batch("smart", 1, seed=5, message_size=policy.message_size, horizon=40)
-    memory, observations = begin(policy, batch), batch.reset()
-    for _ in range(40):
-        np.testing.assert_array_equal(own, observations[0, 2])
-        actions, memory = policy.act(observations, memory)
-        own, reward, _, truncated, info = env.step(actions[0, 2])
-        observations, rewards, _, _, infos = batch.step(actions)
-        assert reward == pytest.approx(float(rewards[0, 2]))
-        assert info["score"] == pytest.approx(float(infos["score"][0]))
+    names = ("observations", "actions", "rewards", "score")
+    played = rollout(batch_for(policy, "smart", seed=5, horizon=40), policy, names)
+    for t in range(40):
+        np.testing.assert_array_equal(own, played["observations"][t, 0, 2])
+        own, reward, _, truncated, info = env.step(played["actions"][t, 0, 2])
+        assert reward == pytest.approx(float(played["rewards"][t, 0, 2]))
+        assert info["score"] == pytest.approx(float(played["score"][t, 0]))
     assert truncated
-    assert info["metrics/score"] == pytest.approx(float(infos["metrics/score"][0]))
+    assert info["metrics/score"] == pytest.approx(played.metrics["score"][0])
 
 
 def test_a_planner_plays_the_team_mates_and_a_number_of_numpy_is_a_tracker() -> None:
