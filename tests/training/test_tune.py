@@ -14,7 +14,7 @@ from posse.numeric import FloatArray
 from posse_baselines import DDCS, Memory, tunables
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import Tunable, tuned
-from posse_training.errors import RunFolderError
+from posse_training.errors import RunFolderError, SettingsError
 from posse_training.tune import Space, TuneSettings, _Run, tune
 
 BEST = 0.35
@@ -46,6 +46,13 @@ class Biased(DDCS):
         actions, memory = super().act(observations, memory)
         actions[..., 1] = np.clip(actions[..., 1] + 2.0 * (self.bias.bias - BEST), -1.0, 1.0)
         return actions, memory
+
+
+class Deaf(Biased):
+    """The same, which plays its defaults whatever its settings."""
+
+    def with_settings(self, **values: Any) -> "Deaf":
+        return self
 
 
 POLICY = "tests.training.test_tune:Biased"
@@ -87,6 +94,12 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     card = card_of(small(tmp_path / "run", generations=None, minutes=0.001))
     generations = int(card["command"].split("--generations ")[1].split()[0])
     assert card_of(small(tmp_path / "again", generations=generations)) == card
+
+
+def test_a_policy_whose_settings_change_nothing_is_refused(tmp_path: Path) -> None:
+    deaf = small(tmp_path / "run", policy="tests.training.test_tune:Deaf")
+    with pytest.raises(SettingsError, match="no setting of '.*Deaf' has an effect on 'paper-distributed'"):
+        tune(deaf, console=quiet())
 
 
 def test_a_folder_of_another_run_or_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
