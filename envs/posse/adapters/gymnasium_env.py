@@ -63,6 +63,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
+        self._shape = self.action_space.shape  # to ask the space takes a percent of a step
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -83,7 +84,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
     def actions_of(self, action: Any) -> FloatArray:
         """Return an action as an array (1, rows, 2 + m) in [-1, 1]; ValueError as for :meth:`step`."""
-        motions = as_motions("action", action, self.action_space.shape, self._discrete)
+        motions = as_motions("action", action, self._shape, self._discrete)
         return in_box(motions.reshape(self.batch.action_shape), self.batch.clip_actions)
 
     def _info(self) -> dict[str, Any]:

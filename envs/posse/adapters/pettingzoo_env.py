@@ -63,6 +63,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.action_spaces = {
             a: single_action_space(self.scenario.message_size, self._discrete) for a in self.possible_agents
         }
+        self._goes_on = dict.fromkeys(self.possible_agents, False)  # each step copies it, faster than making it
         self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         self.np_random = np.random.default_rng(settings.get("seed"))  # that of SuperSuit's frame_skip_v0; no world's
 
@@ -101,7 +102,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         agents, batch, own = self.possible_agents, self.batch, self._own
         batch.check_running()
         self._advance(self.actions_of(actions))
-        terminations, truncations = dict.fromkeys(agents, False), dict.fromkeys(agents, False)
+        terminations, truncations = self._goes_on.copy(), self._goes_on.copy()
         if batch._over:
             (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
         return (
