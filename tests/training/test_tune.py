@@ -98,7 +98,7 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
 
 def test_a_policy_whose_settings_change_nothing_is_refused(tmp_path: Path) -> None:
     deaf = small(tmp_path / "run", policy="tests.training.test_tune:Deaf")
-    with pytest.raises(SettingsError, match="no setting of '.*Deaf' has an effect on 'paper-distributed'"):
+    with pytest.raises(SettingsError, match=r"no setting of '.*Deaf' has an effect on 'paper-distributed'"):
         tune(deaf, console=quiet())
 
 
