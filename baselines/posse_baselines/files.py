@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import math
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,8 +17,8 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
-    """Write a value as JSON (:func:`to_json`), as :func:`write_atomically` does."""
-    write_atomically(path, (json.dumps(to_json(value), indent=indent, allow_nan=False) + "\n").encode())
+    """Write a value as JSON, as :func:`write_atomically` does."""
+    write_atomically(path, (json.dumps(value, indent=indent) + "\n").encode())
 
 
 @contextlib.contextmanager
@@ -50,19 +49,5 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file of :func:`write_json`; ValueError if it holds none."""
-    return json.loads(path.read_text(encoding="utf-8"), object_hook=from_json)
-
-
-def to_json(value: Any) -> Any:
-    """Return a value for JSON, with ``{"number": "inf"}`` for an infinite number."""
-    if isinstance(value, dict):
-        return {name: to_json(part) for name, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [to_json(part) for part in value]
-    return {"number": str(value)} if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def from_json(found: dict[str, Any]) -> Any:
-    """Return an object that is read from JSON, or the number of :func:`to_json` that it stands for."""
-    return float(found["number"]) if list(found) == ["number"] else found
+    """Return the content of a JSON file; ValueError if it holds none."""
+    return json.loads(path.read_text(encoding="utf-8"))

@@ -32,7 +32,7 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
 def policy_for(layout: posse.ObservationLayout, kind: str = "features", **changes: Any) -> LearnedPolicy:
     """A policy of arbitrary weights and the name "mine"."""
     encoding = Encoding.of(layout, kind)
-    return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine", "arena": np.inf})
+    return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 
 
 def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides: Any) -> Any:

@@ -112,8 +112,8 @@ def test_a_folder_of_another_run_or_damaged(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(RunFolderError, match=rf"cmaes='[0-9.]+', not '0', .*digest of {POLICY}='.*', not '0'"):
         tune(small(run), console=quiet())
     monkeypatch.undo()
-    (tmp_path / "mine.txt").touch()
-    with pytest.raises(RunFolderError, match="is not an empty folder"):
+    (tmp_path / "tuned.json").touch()
+    with pytest.raises(RunFolderError, match=r"has tuned\.json, but no settings\.json"):
         tune(small(tmp_path), console=quiet())
     (run / "state.json").write_text((run / "state.json").read_text()[:100])
     with pytest.raises(RunFolderError, match=r"state\.json is damaged"):

@@ -19,7 +19,6 @@ import tyro
 import posse
 from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
-from posse_baselines.files import to_json
 from posse_training.errors import SettingsError, require
 from posse_training.evaluation.evaluation import played_errors, progress_bar
 from posse_training.files import locked
@@ -109,7 +108,7 @@ def record_dataset(
             "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
             "requirements": [f"posse-rl=={posse.__version__}"],
             "minari_version": minari.__version__,
-            "posse": json.dumps(to_json(about)),
+            "posse": json.dumps(about),
         }
         shutil.rmtree(partial / "new", ignore_errors=True)  # of a recording that was killed
         (data := partial / "new" / "data").mkdir(parents=True)

@@ -49,7 +49,7 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     from cmaes import SepCMA
 
     s, basis = settings, _basis(settings)
-    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"), alone=False)  # others draw other candidates
+    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
         with intact(folder / STATE):

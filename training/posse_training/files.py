@@ -62,14 +62,14 @@ def intact(path: Path) -> Iterator[None]:
         raise RunFolderError(f"{path} is damaged, or no run's: {error!r:.200}. Choose another --out") from error
 
 
-def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = (), *, alone: bool = True) -> None:
-    """Raise if a file holds other settings of a run, but for those that are ``free``, or is missing beside others.
-
-    With ``alone=False`` others may be there first.
-    """
+def check_held(
+    path: Path, settings: Mapping[str, Any], free: Collection[str] = (), results: Collection[str] = ()
+) -> None:
+    """Raise if a file holds other settings of a run, but for those that are ``free``, or is missing beside results."""
     if not path.is_file():
-        if alone:
-            check_new(path.parent)
+        for name in results:
+            if (path.parent / name).exists():
+                raise RunFolderError(f"{path.parent} has {name}, but no {path.name} of a run: choose another --out")
         return
     wanted = json.loads(json.dumps(settings))
     with intact(path):
@@ -80,9 +80,11 @@ def check_held(path: Path, settings: Mapping[str, Any], free: Collection[str] = 
         raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another --out, or remove it")
 
 
-def hold_settings(path: Path, settings: Mapping[str, Any], free: Collection[str] = (), *, alone: bool = True) -> None:
+def hold_settings(
+    path: Path, settings: Mapping[str, Any], free: Collection[str] = (), results: Collection[str] = ()
+) -> None:
     """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
-    check_held(path, settings, free, alone=alone)
+    check_held(path, settings, free, results)
     write_json(path, settings)
 
 

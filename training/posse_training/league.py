@@ -23,10 +23,10 @@ from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.registry import is_code
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
-from posse_training.evaluation.evaluation import evaluate, played_errors
+from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import hold_settings, locked, write_csv
+from posse_training.files import check_held, hold_settings, locked, write_csv
 from posse_training.options import Changes, Pairs
 from posse_training.provenance import digests
 from posse_training.train.presets import default_settings
@@ -251,10 +251,7 @@ class League:
 
     def _play(self, team: Member, target: Member, episodes: int, seed: int, split: str) -> Results:
         self.console.print(f"playing {team.label} against {target.label}", markup=False)
-        with played_errors():
-            return evaluate(
-                team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False
-            )
+        return evaluate(team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False)
 
 
 def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
@@ -269,13 +266,14 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         met = len(others) + settings.generations  # by the last member of the side
         if first.num_worlds < (most := met + _SHARES + met // 2):  # parts, as shares() rounds them
             raise SettingsError(f"num_worlds={first.num_worlds} is too few for {met} opponents in the end: use {most}")
-    if any(found._members(side, settings.generations + 1)[-1].trained for side in (TARGET, TEAM)):
-        less = f"generations={settings.generations} is less than {settings.path} has"
-        raise SettingsError(f"{less}: raise it, or choose another --out")
     with locked(settings.path):
         held = {**settings.to_dict(), "scenario_version": found.scenario.version}
         held |= digests((*settings.teams, *settings.targets))
-        hold_settings(settings.path / "league.json", held, _FREE)
+        check_held(file := settings.path / "league.json", held, _FREE)
+        if any(found._members(side, settings.generations + 1)[-1].trained for side in (TARGET, TEAM)):
+            less = f"generations={settings.generations} is less than {settings.path} has"
+            raise SettingsError(f"{less}: raise it, or choose another --out")
+        hold_settings(file, held, _FREE)
         found.play()
         write_results(found)
     return found

@@ -155,7 +155,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
     held |= {"tunables": [list(each) for each in run.tunables], **digests([settings.policy])}
     with connected(settings.ray), locked(folder):
-        hold_settings(folder / "settings.json", held)
+        hold_settings(folder / "settings.json", held, results=(RESULT,))
         write_json(folder / RESULT, run.play())
     return folder / RESULT
 

@@ -20,7 +20,7 @@ from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.ddcs import DDCS, Settings
-from posse_baselines.files import from_json, to_json, write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.learned.inputs import EncodedField, Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
@@ -179,7 +179,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         path = Path(path)
         tensors, text = _read(path)
         try:
-            description = json.loads(text, object_hook=from_json)
+            description = json.loads(text)
             if description["format"] != FORMAT:
                 raise PolicyError(
                     f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
@@ -214,7 +214,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
 def write_policy_file(path: Path, tensors: Mapping[str, FloatArray], description: Any) -> None:
     """Write a policy file; its description is any JSON."""
-    text = json.dumps(to_json(description), sort_keys=True, allow_nan=False)
+    text = json.dumps(description, sort_keys=True)
     write_atomically(path, save(dict(tensors), {_KEY: text, "digest": _digest(tensors, text)}))
 
 

@@ -172,7 +172,7 @@ def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
     assert_equal(numbers(tmp_path / "whole"), numbers(folder))
 
 
-def test_a_checkpoint_that_is_damaged_or_of_other_settings_and_a_folder_in_use_are_named(tmp_path: Path) -> None:
+def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Path) -> None:
     train(small(tmp_path), console=quiet())
     settings = json.loads((tmp_path / "settings.json").read_text())
     (tmp_path / "settings.json").write_text(json.dumps({**settings, "versions": [0]}))
@@ -185,5 +185,12 @@ def test_a_checkpoint_that_is_damaged_or_of_other_settings_and_a_folder_in_use_a
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(RunFolderError, match=r"checkpoint\.pt is damaged"):
         resume(tmp_path)
+    (tmp_path / "settings.json").unlink()
+    with pytest.raises(RunFolderError, match=r"has best\.safetensors, but no settings\.json of a run"):
+        train(small(tmp_path), console=quiet())
+
+
+def test_a_folder_in_use(tmp_path: Path) -> None:
     with locked(tmp_path), pytest.raises(RunFolderError, match=f"process {os.getpid()} uses"):
-        resume(tmp_path)
+        train(small(tmp_path), console=quiet())
+    assert not (tmp_path / "settings.json").exists()

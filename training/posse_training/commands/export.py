@@ -9,12 +9,13 @@ from typing import Annotated, Final
 import numpy as np
 import tyro
 
-from posse_baselines.files import to_json, write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_baselines.registry import SHIPPED_TARGETS, shipped
 from posse_training.errors import SettingsError, require
+from posse_training.replay.format import to_json
 
 _OPSET: Final = 13
 _IR_VERSION: Final = 8

@@ -77,11 +77,11 @@ def table(rows: Sequence[Row], title: str) -> Table:
 
 
 def cell(name: str, value: Estimate | float | None) -> str:
-    """Return an estimate with its interval below it; shares of worlds, and what has no interval, are shown without."""
+    """Return an estimate with its interval below it; shares of worlds are shown without."""
     if isinstance(value, Estimate):
         if name in ("contact_free", "improvement", "settled"):
             return f"{100 * value.value:.1f} %"
-        return str(value).replace(" ", "\n", 1)
+        return f"{value.value:.3f}\n[{value.low:.3f}, {value.high:.3f}]"
     return "" if value is None else f"{value:.2f}"
 
 

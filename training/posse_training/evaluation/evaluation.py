@@ -14,11 +14,11 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from posse import Family, Scenario, ScenarioError
-from posse.declarations import DeclarationError, is_number
+from posse.declarations import is_number
 from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
-from posse_training.errors import PlayError, SettingsError, UserError, describe
+from posse_training.errors import PlayError, SettingsError, describe
 from posse_training.evaluation.episodes import Match, play_shard, refuse_trained_split, refuse_two_targets
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
@@ -173,7 +173,7 @@ def played_errors() -> Iterator[None]:
         yield
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
-    except (UserError, ScenarioError, DeclarationError):
+    except FAILURES:
         raise
     except Exception as error:
         raise PlayError(describe(error)) from None

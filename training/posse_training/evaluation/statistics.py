@@ -4,7 +4,7 @@ Intervals of means are bootstraps, seeded, so that tables are reproducible. What
 a whole: of a family ten worlds in a row, which play the same drawn scenario and so say little more of others than one
 of them does; of a scenario each world alone. Blocks of a family are few, and percentiles of few values lie too near
 (Hesterberg, What Teachers Should Know about the Bootstrap, 2015): their interval is Student's t times the bootstrap's
-standard deviation, within [0, 1] where all values are. One block alone has no interval: both ends are its value.
+standard deviation. One block alone has no interval: both ends are its value.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ class Estimate:
     def __str__(self) -> str:
         if self.count == 0:
             return "-"
-        return f"{self.value:.3f}{f' [{self.low:.3f}, {self.high:.3f}]' if self.low < self.high else ''}"
+        return f"{self.value:.3f} [{self.low:.3f}, {self.high:.3f}]"
 
 
 def mean(values: npt.ArrayLike, block: int = 1) -> Estimate:
@@ -65,7 +65,7 @@ def share(happened: npt.ArrayLike, block: int = 1) -> Estimate:
     low, high = ((p + z2 / (2 * n) + side) / (1 + z2 / n) for side in (-half, half))
     if len(events) > 1 or block > 1:
         wide = over_seeds(events, block=block)
-        low, high = min(low, wide.low), max(high, wide.high)
+        low, high = max(0.0, min(low, wide.low)), min(1.0, max(high, wide.high))
     return Estimate(float(p), float(low), float(high), events.size)
 
 
@@ -90,13 +90,15 @@ def over_seeds(values: npt.ArrayLike, statistic: Statistic = np.mean, block: int
 def difference(first: npt.ArrayLike, second: npt.ArrayLike, block: int = 1) -> Estimate:
     """Return the mean of first - second, paired by world.
 
-    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. The interval is as in
-    :func:`over_seeds`.
+    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. With one policy
+    each the interval is a bootstrap over blocks of worlds, else as in :func:`over_seeds`.
 
     Raises:
         ValueError: Different numbers of worlds.
     """
     mine, theirs = _paired(first, second)
+    if len(mine) == len(theirs) == 1:
+        return mean(mine[0] - theirs[0], block)
     return _resample((mine, theirs), lambda a, b, axis: a.mean(axis) - b.mean(axis), block)
 
 
@@ -149,9 +151,6 @@ def _resample(parts: Sequence[Values], statistic: Statistic, block: int) -> Esti
     if block > 1 and blocks > 1:  # few: their percentiles would lie too near
         half = scipy.stats.t.ppf((1 + LEVEL) / 2, blocks - 1) * np.sqrt(blocks / (blocks - 1)) * drawn.std()
         low, high = found - half, found + half
-    if len(parts) == 1:  # no mean of values leaves their range, however the seeds are spread
-        least, most = float(np.nanmin(parts[0])), float(np.nanmax(parts[0]))
-        if block > 1:  # the range of few blocks is too narrow
-            least, most = (0.0, 1.0) if least >= 0 and most <= 1 else (-np.inf, np.inf)
-        low, high = np.clip((low, high), least, most)
+    if len(parts) == block == 1:  # no mean of values leaves their range, however the seeds are spread
+        low, high = np.clip((low, high), np.nanmin(parts[0]), np.nanmax(parts[0]))
     return Estimate(found, float(low), float(high), parts[0].size)

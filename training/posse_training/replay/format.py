@@ -15,7 +15,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse_baselines.files import from_json, to_json
 from posse_training.errors import SettingsError
 from posse_training.replay.episode import Event, Player, Replay
 
@@ -62,7 +61,7 @@ def decode(data: bytes) -> Replay:
     SettingsError for another format; for damaged data ValueError, TypeError, KeyError or zlib.error.
     """
     text, _, raw = zlib.decompress(data).partition(b"\n")
-    header = json.loads(text, object_hook=from_json)
+    header = json.loads(text, object_hook=_from_json)
     if header["format"] != FORMAT:
         raise SettingsError(f"a replay of format {header['format']!r:.80} cannot be read: known is {FORMAT}")
     players = []
@@ -100,3 +99,16 @@ def _unpack(raw: bytes, frames: int) -> npt.NDArray[np.int64]:
     planes = np.frombuffer(raw, np.uint8).reshape(4, -1)
     folded = np.ascontiguousarray(planes.T).view("<u4").astype(np.int64).reshape(-1, frames)
     return np.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
+
+
+def to_json(value: Any) -> Any:
+    """Return a value for JSON, with ``{"number": "inf"}`` for an infinite number."""
+    if isinstance(value, dict):
+        return {name: to_json(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_json(part) for part in value]
+    return {"number": str(value)} if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _from_json(found: dict[str, Any]) -> Any:
+    return float(found["number"]) if list(found) == ["number"] else found

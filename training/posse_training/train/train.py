@@ -12,10 +12,8 @@ from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
-from posse.declarations import users_modules
 from posse_baselines import load
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.evaluation.evaluation import has_code, played_errors
 from posse_training.evolution import check_adviser, evolve
 from posse_training.files import check_held, hold_settings, locked, write_csv
 from posse_training.train import checkpoint
@@ -46,23 +44,19 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
 
     Raises:
         SettingsError, PolicyError: What :func:`check_before` finds.
-        RunFolderError: The folder is in use, has other settings, files of no run or a damaged checkpoint; or the
-            networks diverged.
-        PlayError: An error of code that is played against, copied or declared.
+        RunFolderError: The folder is in use, has other settings or a damaged checkpoint; or the networks diverged.
     """
     check_before(settings)
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
-        if has_code(*settings.opponents, settings.imitate) or users_modules():
-            stack.enter_context(played_errors())
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
-        if settings.algorithm != EVOLUTION:  # which raise for what does not fit, before the folder is made
+        if settings.algorithm != EVOLUTION:  # they refuse what does not fit before the folder is made
             env = make_env(settings, num_threads)
             model = ALGORITHMS[settings.algorithm].make(settings, env)
             env.arrays()  # an opponent's memory that cannot be saved raises now, not at the first checkpoint
         stack.enter_context(locked(folder))
-        check_held(folder / SETTINGS, settings.held(), FREE)
+        check_held(folder / SETTINGS, settings.held(), FREE, (BEST, LAST, checkpoint.CHECKPOINT))
         # A run killed before its first checkpoint starts again, with the same result.
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         display = Display(settings, console or Console())
@@ -71,6 +65,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
             hold_settings(folder / SETTINGS, settings.held(), FREE)
             display.beside = score_beside(settings, display)
             return evolve(settings, folder, display, num_threads)
+        model.set_logger(make_logger(folder, settings))
         display.beside = score_beside(settings, display)
         run = Run(settings, folder, env, model, display)
         if saved is None:
@@ -79,7 +74,6 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
             run.restore(saved)
             display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
         hold_settings(folder / SETTINGS, settings.held(), FREE)  # now that it can begin
-        model.set_logger(make_logger(folder, settings))
         display.begin(model.num_timesteps, max(model.num_timesteps, steps_made(settings, env.num_envs)))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
