@@ -10,6 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 # Windows of tests need no screen; what commands print is compared in 80 columns and without colours.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-os.environ.update(COLUMNS="80", FORCE_COLOR="")
+os.environ.update(COLUMNS="80", NO_COLOR="1")
+os.environ.pop("FORCE_COLOR", None)
 # Properties are tried on the same examples in every run, and however long one takes.
 settings.load_profile("ci")

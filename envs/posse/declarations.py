@@ -146,7 +146,9 @@ class Declaration:
         """Return a function, compiled if kernels call it; raise DeclarationError if it has other parameters."""
         if not isinstance(plain(function), FunctionType):
             raise self.error(f"declare a function, made by def, not a {type(function).__name__}", function)
-        given = f"({', '.join(parameters_of(function))})"
+        signature = inspect.signature(plain(function))
+        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
         if given not in allowed.split(" or "):
             raise self.error(f"its parameters are {given}, not {allowed}", function)
         working: Function = compiled(plain(function)) if given.startswith("(c") else function

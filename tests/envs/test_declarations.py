@@ -37,6 +37,7 @@ MISTAKES: Final = {
     '@posse.field("1", 0, 1)\ndef sonar(c, v):\n    """?"""': r"sonar \(main.py:1\): the name 'sonar' is taken",
     TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
     'def own(c, w):\n    """?"""\nown.__name__ = "a-b"\nposse.metric("1")(own)': "'a-b': use letters, digits, _$",
+    FIELD.format('"1", 0, 1', "c, **v", "1"): r"its parameters are \(c, \*\*v\), not \(c\) or",
     FIELD.format('"1", 0, 1', "c", "1").replace('["own"]', '["wn"]'): r"unknown observation field 'wn' .*'own'\?",
     # Options.
     **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.own.x"): rf"size={size} must be a whole number from 1 to 256"
@@ -164,6 +165,11 @@ def test_a_motion_may_be_called_motion() -> None:
     """What draws it has a name of its own in the generated module."""
     code = MOTION.replace("own", "motion").format(", draw=draw", "", "pass")
     printed("-c", f"import posse\ndef draw(c, w):\n    pass\n{code}.reset()", NUMBA_DISABLE_JIT="1")
+
+
+def test_a_sensor_may_be_called_almost_as_a_built_in_one() -> None:
+    code = SENSOR.format("c, w, number, dx, dy", '"range_bearing"')
+    printed("-c", f"import posse\n{code}posse.batch(sensor='range_bearing').reset()", NUMBA_DISABLE_JIT="1")
 
 
 EXAMPLES = {Path(title).stem: text for _, title, text in blocks("docs/extend.md") if title is not None}

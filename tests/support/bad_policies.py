@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from posse import get_scenario
+from posse import DeclarationError, get_scenario
 from posse_baselines.policies.simple import Idle, Pursuit
 
 
@@ -36,6 +36,11 @@ class Nan(Idle):
 class Builds(Idle):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         raise get_scenario("nope")  # type: ignore[misc]
+
+
+class Declares(Idle):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        raise DeclarationError("mine")
 
 
 class Untold(Idle):

@@ -12,7 +12,7 @@ import numpy as np
 from posse.declarations import Declarations, unknown
 from posse.scenarios.named import SCENARIOS, get_scenario
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import SPLITS, ScenarioError, check_choice, check_count, fail
+from posse.scenarios.setting import SPLITS, ScenarioError, UnknownSettingError, check_choice, check_count, fail
 
 Range = tuple[float, float]
 """Least and greatest value of a setting, both included."""
@@ -97,15 +97,17 @@ class Family:
 
 def _accepted(name: str, bounds: Range) -> Range:
     """Return a range as the setting keeps its values, or raise ScenarioError."""
-    setting = Scenario.settings()[name]
+    known = Scenario.settings()
+    if name not in known:
+        raise UnknownSettingError(unknown("setting", name, known))
     if len(bounds) != 2:
         fail(name, bounds, "a range must be two numbers, (least, greatest)")
     if name in _OF_ALL:
         fail(name, bounds, f"a family cannot vary {name}, on which its policies and results rest: set it on its base")
     several = any(isinstance(value, (tuple, list)) for value in bounds)
-    if several or ("int" not in setting.kind and not setting.kind.startswith("float")):
+    if several or ("int" not in known[name].kind and not known[name].kind.startswith("float")):
         fail(name, bounds, "a family varies settings that are one number")
-    low, high = (setting.accept(name, value) for value in bounds)
+    low, high = (known[name].accept(name, value) for value in bounds)
     if not low <= high < math.inf:
         fail(name, bounds, "the least must not be above the greatest, which must be finite")
     return low, high
@@ -131,9 +133,9 @@ def family(base: str | Scenario | Family, /, *, name: str | None = None, **setti
         base = Family(name=base, base=get_scenario(start), ranges=tuple(ranges.items()), meaning=meaning)
     ranges, rest, kinds = dict(base.ranges) if isinstance(base, Family) else {}, {}, Scenario.settings()
     for setting, value in settings.items():
-        single = setting in kinds and not kinds[setting].kind.startswith(("tuple", "Mapping"))
-        if single and isinstance(value, (tuple, list, np.ndarray)):
-            ranges[setting] = tuple(value)
+        of_several = setting in kinds and kinds[setting].kind.startswith(("tuple", "Mapping"))
+        if isinstance(value, (tuple, list, np.ndarray)) and not of_several:
+            ranges[setting] = tuple(value.tolist() if isinstance(value, np.ndarray) else value)
         else:
             ranges.pop(setting, None)
             rest[setting] = value

@@ -99,7 +99,8 @@ class _Module:
     def _call(self, alias: str, function: Function) -> str:
         """Return the call of a declared function with its parameters as arguments."""
         alias = alias.replace("-", "_")
-        self.functions[alias] = function
+        while self.functions.setdefault(alias, function) is not function:
+            alias += "_"
         return f"{alias}({', '.join(parameters_of(function))})"
 
     def _columns(self, fields: Iterable[field]) -> Iterator[str]:

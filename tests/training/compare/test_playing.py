@@ -31,7 +31,7 @@ def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> CompareSet
 
 @pytest.mark.long
 def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
-    names = ("Raises", "Nan", "Builds", "Untold", "Crashes")
+    names = ("Raises", "Nan", "Builds", "Declares", "Untold", "Crashes")
     settings = settings_for(tmp_path, *names)
     same = "posse_baselines.policies.simple:Pursuit"
     found = compare(replace(settings, policies=(*settings.policies, same)))
