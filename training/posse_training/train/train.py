@@ -51,7 +51,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
     with contextlib.ExitStack() as stack:
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
-        if settings.algorithm != EVOLUTION:  # they refuse what does not fit before the folder is made
+        if settings.algorithm != EVOLUTION:  # both refuse what does not fit, before the folder is made
             env = make_env(settings, num_threads)
             model = ALGORITHMS[settings.algorithm].make(settings, env)
             env.arrays()  # an opponent's memory that cannot be saved raises now, not at the first checkpoint
