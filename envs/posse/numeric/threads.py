@@ -16,7 +16,7 @@ from posse.numeric.lanes import WIDTH
 MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Number of cores available to the process."""
 _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
-_LEAST_SHARE: Final = 16 * WIDTH  # of many worlds; to step them takes ten times as long as a call
+_LEAST_SHARE: Final = 8 * WIDTH  # of many worlds; to step them takes several times as long as a call
 
 
 @functools.cache
@@ -76,7 +76,8 @@ def over_worlds(
     threads = threads_for(num_worlds, robots_each, most)
     if threads == 1:
         return [kernel(*arguments, 0, 0, num_worlds)]
-    shares = iter(_shares_of(num_worlds, threads))  # all threads take from them
+    *shared, last = _shares_of(num_worlds, threads)
+    shares = iter(shared)  # all threads take from them; the last one is the caller's, which else would have to be woken
 
     def work(thread: int) -> list[Any]:
         return [kernel(*arguments, thread, first, end) for first, end in shares]
@@ -84,7 +85,7 @@ def over_worlds(
     with _interrupts_wait():
         others = [_executor().submit(work, thread) for thread in range(1, threads)]
         try:
-            results = work(0)
+            results = [*work(0), kernel(*arguments, 0, *last)]
         finally:
             others = [other for other in others if not other.cancel()]  # not begun: the shares are all taken
             futures.wait(others)
