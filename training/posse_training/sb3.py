@@ -50,7 +50,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         whole_team: Whether one observation is that of all trackers, so that no robot can play it alone.
 
     Raises:
-        PolicyError: Spaces that no environment of posse has; no model, or no wrapper.
+        PolicyError: Spaces that no environment of posse has; no model; a ``normalize`` that is no VecNormalize.
     """
 
     def __init__(

@@ -104,7 +104,7 @@ class Robot:
             raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
         self.number, self.scale = number, scale
         self.layout = ObservationLayout(self.scenario)
-        lossy = max(self.scenario.radio_loss, _BARELY_LOSSY)  # a perfect radio equals the state, and stores nothing
+        lossy = max(self.scenario.radio_loss, _BARELY_LOSSY)  # worlds with a perfect radio store no messages
         self._world = Batch(self.scenario.replace(radio_loss=lossy), 1, num_threads=1)
         self.reset()
         self.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0))  # compiles, which would halt a control loop

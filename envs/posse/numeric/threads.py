@@ -77,7 +77,8 @@ def over_worlds(
     if threads == 1:
         return [kernel(*arguments, 0, 0, num_worlds)]
     *shared, last = _shares_of(num_worlds, threads)
-    shares = iter(shared)  # all threads take from them; the last one is the caller's, which else would have to be woken
+    # All threads take from these, and the caller alone takes the last: so it rarely waits, and waking it takes long.
+    shares = iter(shared)
 
     def work(thread: int) -> list[Any]:
         return [kernel(*arguments, thread, first, end) for first, end in shares]
