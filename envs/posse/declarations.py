@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import copy
 import difflib
+import dis
 import functools
 import inspect
 import keyword
@@ -151,7 +152,12 @@ class Declaration:
         given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
         if given not in allowed.split(" or "):
             raise self.error(f"its parameters are {given}, not {allowed}", function)
-        working: Function = compiled(plain(function)) if given.startswith("(c") else function
+        if not given.startswith("(c"):
+            return function  # type: ignore[no-any-return]
+        stores = any(step.opname == "STORE_ATTR" for step in dis.get_instructions(plain(function)))
+        if stores and not self.built_in and not isinstance(self, target_motion):
+            raise self.error("it assigns to a field of a record, as target motions alone may: return a value", function)
+        working: Function = compiled(plain(function))
         return working
 
     @property
@@ -283,8 +289,8 @@ class field(Declaration):  # noqa: N801 (used as a function is)
     def _bound(self, name: str, scenario: Any) -> float:
         """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""
         value = self._value(name, scenario)
-        if not is_number(value):
-            raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
+        if not is_number(value) or abs(value) > np.finfo(np.float32).max:
+            raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number of 32 bits")
         return float(value)
 
 
@@ -365,7 +371,10 @@ class metric(Declaration):  # noqa: N801
     def of(self, scenario: Any, worlds: Records) -> npt.NDArray[np.float64]:
         """Return the metric of the current episodes, (E,)."""
         if not self.summed:
-            found = np.asarray(self.function(scenario, worlds), np.float64)
+            try:
+                found = np.asarray(self.function(scenario, worlds), np.float64)
+            except Exception as error:  # a user's function
+                raise self.error(f"in {scenario.name!r}: {error!r}") from error
             if found.shape != worlds.shape:
                 raise self.error(f"it returned an array of shape {found.shape}, not {worlds.shape}, one for each world")
             return found

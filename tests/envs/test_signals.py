@@ -45,6 +45,16 @@ def test_what_the_target_agent_is_given() -> None:
         observations = batch.step(rng.uniform(-1, 1, batch.action_shape))[0]
 
 
+@pytest.mark.parametrize("beams", [2, 5, 12])
+def test_no_robot_hides_between_two_beams(beams: int) -> None:
+    angle, away = np.meshgrid((2 * np.arange(beams) + 1) * np.pi / beams, np.arange(0.8, 1.6, 0.05))
+    place = np.stack([away * np.cos(angle), away * np.sin(angle), 0 * angle], axis=-1).reshape(-1, 1, 3)
+    batch = posse.batch(num_worlds=len(place), num_trackers=2, sonar_beams=beams)
+    options = {"tracker_pose": np.concatenate([0 * place, place], axis=1), "target_pose": (9.0, 9.0, 0.0)}
+    readings = batch.layout.views(batch.reset(options=options))["sonar"][:, 0].min(axis=-1)
+    np.testing.assert_allclose(readings, away.reshape(-1) - 2 * batch.scenario.robot_radius, rtol=1e-4, atol=1e-4)
+
+
 def test_the_target_agent_feels_a_wall() -> None:
     batch = posse.batch(target_motion="agent", num_trackers=1, arena=10.0, start_distance=(1, 9))
     batch.reset(options={"target_pose": [4.5, 0, 0], "tracker_pose": [[0, 0, 0]]})

@@ -26,8 +26,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     **Observation**: ``Box`` (F,) float32: own sensors, odometry and radio; its fields, in order,
     are ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
-    ``target_0`` has the same layout and observes the nearest ``num_neighbours`` trackers without error; by default that
-    is all but the farthest.
+    ``target_0`` has the same layout and observes the nearest ``num_neighbours`` trackers without error; by default all
+    but the farthest, at most eight.
 
     **Action**: ``Box(-1, 1, (2 + message_size,))`` float32: speed (-1 is at rest, 1 the maximum),
     turn rate (1 is the maximum to the left), message. With ``discrete_actions=True``

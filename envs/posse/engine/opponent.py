@@ -22,8 +22,8 @@ class TargetPolicy(Protocol):
     """Moves the target of every world; it observes the trackers without error.
 
     A policy of one robot: what the target observes has the fields of a tracker's observation, with
-    the nearest ``num_neighbours`` trackers in the places of team-mates: by default all but the farthest, so one tracker
-    alone is not observed. What the policy remembers is in its memory.
+    the nearest ``num_neighbours`` trackers in the places of team-mates: by default all but the farthest, at most
+    eight; one tracker alone is not observed. What the policy remembers is in its memory.
     """
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:

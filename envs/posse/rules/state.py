@@ -92,7 +92,8 @@ DERIVED: Final[_Numbers] = {
     "target_extent_y": (_F, lambda s: s.target_extent[1]),
     "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
     "view_cosine": (_F, lambda s: math.cos(s.field_of_view / 2)),
-    "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0),
+    # of half a beam's width, with an overlap, since rounding would hide what is exactly between two beams
+    "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) - 3e-7 if s.sonar_beams else 1.0),
     "smoothing": (_F, lambda s: _share(s.control_step, s.velocity_smoothing)),
 }
 """What kernels read of a scenario beside its numbers: type and value."""

@@ -121,10 +121,10 @@ class Scenario:
         "wedge", "wedge: behind the target, as in the paper; ring: around it; rows: a block behind", choices=FORMATIONS
     )
     formation_distance: float = setting(
-        1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, FARTHEST, above=True
+        1.2, "from the target to the nearest slot (ring: least radius; rows: first row)", "m", 0, FARTHEST, above=True
     )
     formation_spacing: float = setting(
-        1.2, "between neighbouring slots; more than twice the tolerance", "m", 0, FARTHEST, above=True
+        1.2, "between neighbouring slots (ring: at least); more than twice the tolerance", "m", 0, FARTHEST, above=True
     )
     tolerance: float = setting(0.3, "a slot is occupied when a tracker is within this distance", "m", SMALL, WIDE)
     settle_time: float = setting(
@@ -171,7 +171,7 @@ class Scenario:
     )
     bearing_noise: float = setting(0.0, "standard deviation of a measured bearing; truncated at three", "rad", 0, 0.5)
     velocity_smoothing: float = setting(
-        0.0, "time constant of the velocity estimated from successive fixes; 0: none", "s", 0, WIDE
+        0.0, "time constant of the velocity estimated from fixes of every step; 0: none", "s", 0, WIDE
     )
     heading_noise: float = setting(
         0.0, "standard deviation of the target's measured heading and ψ; truncated at three", "rad", 0, 0.5

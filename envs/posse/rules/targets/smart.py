@@ -25,7 +25,7 @@ _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t
 _DANGER: Final = np.float32(0.6)  # times formation_distance; a nearer tracker triggers a dart
 _ALARM: Final = np.float32(1e3)
 DART_TURN: Final = np.float32(1.3 * math.pi)
-"""A dart lasts as long as a turn by this angle, rad."""
+"""A dart ends at the second decision after the time of a turn by this angle, rad."""
 SMART_DIRECTIONS: Final = 2 * WIDTH
 """Number of candidate directions."""
 
