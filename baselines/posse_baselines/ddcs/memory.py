@@ -81,7 +81,7 @@ def constants_of(scenario: Scenario) -> Records:
         followed=1 - math.exp(-scenario.control_step / lag) if lag > 0 else 1.0,
         sonar_range=_F(scenario.sonar_range / unit),  # reading that means "nothing near", m
         # cosine of a little more than half a beam's width
-        wide_beam=_F(math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))),
+        wide_beam=_F(math.cos(min(1.0, _WIDER / max(1, scenario.sonar_beams)) * math.pi)),
         radius=_F(scenario.robot_radius / unit),  # of a robot's disc, m
         slowest=float(_F(min(scenario.tracker_speeds)) / _F(unit)),  # greatest speed of the slowest tracker, m/s
         patience=patience_of(scenario),  # silence up to which a team-mate counts as working and in range, s

@@ -7,7 +7,7 @@ every time lag), or a tracker has not heard of the leader for too long and appoi
 connected radio graph thus converges to one claim, and two parts that meet again agree on the higher one.
 
 There is a leader from the first step on: while the target is unknown, every tracker appoints itself, and the lowest
-number wins. A tracker that hears no other leads itself (rule ii) under a lower term, so that it yields when it meets a
+number wins. One that then hears no other leads itself (rule ii) under a lower term, so that it yields when it meets a
 group. The leader counts its steps in its message, and the others relay the highest count, so that trackers several hops
 away know that the leader is alive.
 
@@ -144,6 +144,6 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             # The leader of the centralized model takes the first slot.
             if settings.centralized and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
-            cost[j, k] = time + 1e-4 * j
+            cost[j, k] = time + 1e-4 * j * k / n  # of equal costs, the same for all
     assign(cost, work.assigning)
     me.slot = int(work.assigning[0, me.number])
