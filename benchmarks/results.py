@@ -47,6 +47,7 @@ def plays(name: str, scenario: str) -> bool:
 def main() -> None:
     """Play, and replace the rows of what was played."""
     settings = tyro.cli(Settings, description=__doc__)
+    order = posse.scenario_names().index
     rows = {(row.scenario, row.label): row for row in read_standings(TABLE)}
     for scenario in settings.scenario:
         for name in settings.policies:
@@ -57,7 +58,7 @@ def main() -> None:
             row = measure(name, name, policy, scenario, worlds, SEED)
             rows[scenario, name] = row
             print(f"{scenario:12s} {name:30s} {row.safe_score:.3f} [{row.low:.3f}, {row.high:.3f}]", flush=True)
-            ordered = sorted(rows.values(), key=lambda row: (SCENARIOS.index(row.scenario), row.label))
+            ordered = sorted(rows.values(), key=lambda row: (order(row.scenario), row.label))
             TABLE.write_text(standings_text(ordered), encoding="utf-8")
 
 

@@ -59,10 +59,8 @@ def main() -> None:
     last = curve_of(replace(plain, evaluate_worlds=1))[-1]
     print(f"PPO on smart: {last['steps'] / last['seconds']:,.0f} agent-steps/s, {s.threads} threads")
     if s.beat_steps:
-        base = default_settings("smart")
-        every = s.beat_steps // 10
-        run = replace(base, steps=s.beat_steps, seed=s.seed, threads=s.threads, evaluate_every=every)
-        print(time_to_beat(run))
+        steps = {"steps": s.beat_steps, "evaluate_every": s.beat_steps // 10}
+        print(time_to_beat(replace(default_settings("smart"), seed=s.seed, threads=s.threads, **steps)))
 
 
 if __name__ == "__main__":

@@ -74,19 +74,15 @@ Another processor rounds otherwise, so that worlds decide otherwise once in a wh
 
 
 @pytest.mark.parametrize("path", [*TEAMS, *TARGETS], ids=lambda path: path.stem)
-def test_a_shipped_file_is_whole_and_of_this_version(path: Path) -> None:
+def test_a_shipped_file_is_whole_and_says_how_it_was_made(path: Path) -> None:
     policy = LearnedPolicy.from_file(path)
     card = policy.card
     assert path.stat().st_size <= LARGEST
     assert policy.name == path.stem
     assert "test" not in policy.trained_splits
     assert not FOLDERS.search(json.dumps(card))
-
-
-@pytest.mark.parametrize("path", TEAMS, ids=lambda path: path.stem)
-def test_a_shipped_team_says_how_it_was_made(path: Path) -> None:
-    policy = LearnedPolicy.from_file(path)
-    card = policy.card
+    if path in TARGETS:
+        return
     assert set(card) >= NEEDED
     assert card["training_seeds"]
     assert ("train" in policy.trained_splits, card["chosen_on"]) == (True, "validation")

@@ -95,10 +95,11 @@ def test_imitation_copies(tmp_path: Path, guard: bool) -> None:
     env = make_env(settings)
     model = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []
-    statistics = RunningStatistics(env.encoding.size)
+    statistics, before = RunningStatistics(env.encoding.size), model.policy.value_net.weight.clone()
     imitate(model, settings, env.encoding, _Circle(), statistics, lambda line: errors.append(float(line.split()[-1])))
     assert len(errors) == 4
     assert errors[-1] < 0.02
+    assert (model.policy.value_net.weight != before).any(), "of the first half of an episode"
     mine, _ = model.predict(rows := env.reset(), deterministic=True)
     side = env.batches[0].layout.views(rows)["target_bearing"][:, 1]
     assert np.abs(mine[:, 1] - 0.8 * side).mean() < 0.15

@@ -16,13 +16,21 @@ from posse_training.train.vec_env import TeamVecEnv
 HORIZON = 12
 
 
-def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> Any:
-    """One batch, or a batch for each world, whose first episodes are not shortened."""
+def make(worlds: int = 3, *, parts: int = 1, see_state: bool = False, **settings: Any) -> Any:
+    """Return worlds in so many batches."""
     values = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5, "autoreset": "disabled", **settings}
-    kind = values.pop("kind", "plain")
-    parts = [(0, worlds)] if staggered else [(first, 1) for first in range(worlds)]
-    batches = [posse.batch("constant", count, first_world=first, **values) for first, count in parts]
+    kind, each = values.pop("kind", "plain"), worlds // parts
+    batches = [posse.batch("constant", each, first_world=k * each, **values) for k in range(parts)]
     return TeamVecEnv(batches, Encoding.of(batches[0].layout, kind), see_state=see_state)
+
+
+def begin(env: Any) -> Any:
+    """Return the first observations of episodes that are not shortened."""
+    observations = env.reset()
+    for name, array in env.arrays().items():
+        if name.endswith("cut_at"):
+            array[:] = env.batches[0].scenario.horizon
+    return observations
 
 
 def draw(env: Any, generator: np.random.Generator) -> Any:
@@ -32,7 +40,7 @@ def draw(env: Any, generator: np.random.Generator) -> Any:
 def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
     env = make()
     batch = posse.batch("constant", 3, seed=5, horizon=HORIZON, settle_time=0.5, autoreset="same_step")
-    np.testing.assert_array_equal(env.reset().reshape(3, 5, -1), batch.reset())
+    np.testing.assert_array_equal(begin(env).reshape(3, 5, -1), batch.reset())
     generator = np.random.default_rng(1)
     total = np.zeros((3, 5))
     for step in range(1, 3 * HORIZON + 1):
@@ -59,7 +67,7 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
 
 
 def test_shortened_episodes_are_in_no_statistics_of_sb3() -> None:
-    env = make(worlds=4, staggered=True)
+    env = make(worlds=4)
     model = PPO("MlpPolicy", env, device="cpu")
     lengths: Any = evaluate_policy(model, env, n_eval_episodes=20, return_episode_rewards=True)[1]
     assert set(lengths) == {HORIZON}
@@ -71,7 +79,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     env: Any = TeamVecEnv(batches, Encoding.of(batches[0].layout), safeguard=True)
     bare = posse.batch("smart", 3, autoreset="disabled", **settings)
     guard = Guard(bare.layout, 3)
-    env.reset()
+    begin(env)
     seen = bare.reset()
     generator = np.random.default_rng(1)
     for _ in range(2 * HORIZON):
@@ -86,7 +94,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
 
 def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
     env = make(terminate_on_contact=True, horizon=400, num_trackers=2, start_distance=(0.5, 1.0))
-    env.reset()
+    begin(env)
     told: list[dict[str, Any]] = []
     forward = np.tile(np.array([1.0, 0.3], np.float32), (env.num_envs, 1))
     for _ in range(399):  # one less than an episode
@@ -96,8 +104,9 @@ def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
     assert not any(info["TimeLimit.truncated"] for info in told)
 
 
-def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
-    env = make(worlds=4, staggered=True, kind="features", range_noise=0.02, bearing_noise=0.02)
+@pytest.mark.parametrize("parts", [1, 2])
+def test_first_episodes_are_shortened_to_spread_the_ends(parts: int) -> None:
+    env = make(worlds=4, parts=parts, kind="features", range_noise=0.02, bearing_noise=0.02)
     env.reset()
     generator = np.random.default_rng(0)
     ends: list[list[int]] = [[] for _ in range(4)]
@@ -110,8 +119,9 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
             ends[e].append(step)
             assert infos[5 * e]["TimeLimit.truncated"] is True
             assert ("episode" in infos[5 * e]) == ("metrics" in infos[5 * e]) == (step >= HORIZON)
-    assert ends == [[*range((e + 1) * HORIZON // 4, 4 * HORIZON + 1, HORIZON)] for e in range(4)]
-    many = make(worlds=2 * HORIZON, staggered=True)
+    first = (3, 6, 9, 12) if parts == 1 else (3, 9, 6, 12)  # of two batches they take turns
+    assert ends == [[*range(step, 4 * HORIZON + 1, HORIZON)] for step in first]
+    many = make(worlds=2 * HORIZON)
     many.reset()
     assert many.step(draw(many, generator))[2][::5].tolist() == [True] * 3 + [False] * (2 * HORIZON - 3)
 
@@ -132,8 +142,8 @@ def test_teams_of_several_sizes_and_scenarios() -> None:
 
 
 def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
-    env = make(worlds=2, see_state=True)
-    env.reset()
+    env = make(worlds=2, parts=2, see_state=True)
+    begin(env)
     for step in range(HORIZON):
         observations, _, dones, infos = env.step(np.zeros((10, 2), np.float32))
         assert dones.all() == (step == HORIZON - 1)
@@ -173,7 +183,7 @@ def test_invalid_batches_are_refused(batches: list[dict[str, Any]], message: str
 
 
 def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> None:
-    env = make(worlds=2)
+    env = make(worlds=2, parts=2)
     env.set_options({"target_pose": (1.0, 2.0, 0.0), "tracker_pose": [(3.0 * i, 7.0, 0.0) for i in range(5)]})
     for at in (True, False):
         env.reset()
@@ -185,5 +195,5 @@ def test_options_are_of_the_next_reset_and_refused_actions_step_no_batch() -> No
     wrong[9, 0] = np.nan
     for actions, words in ((wrong, "nan"), (np.zeros((5, 4)), r"shape \(5, 4\), wanted \(10, 2\)")):
         with pytest.raises(ValueError, match=words):
-            env.step(actions)
+            env.step(list(actions))
     assert [batch.arrays.world["step"][0] for batch in env.batches] == [0, 0]

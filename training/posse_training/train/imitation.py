@@ -34,7 +34,7 @@ _GRADIENTS: Final = 300  # in each round, at least
 _MINIBATCH: Final = 4096
 _LEARNING_RATE: Final = 1e-3
 _EVERY: Final = 5  # every fifth control step is kept, since successive steps are similar
-_SETTLED: Final = 3.0  # discounted horizons before the end from which returns are incomplete
+_SETTLED: Final = 3.0  # discounted horizons before the end from which returns are incomplete; at most half an episode
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Inputs, the expert's actions, and returns (NaN where incomplete): a row for each world, tracker and kept step."""
@@ -97,8 +97,7 @@ def imitate(
         report(f"copying {settings.imitate}: {k + 1} of {rounds} rounds, squared error {error:.4f}")
     inputs, _, returns = _together(played)
     known = ~returns.isnan()
-    if known.any():
-        fit(lambda x: policy.predict_values(x).flatten(), inputs[known], returns[known])
+    fit(lambda x: policy.predict_values(x).flatten(), inputs[known], returns[known])
 
 
 def _together(parts: list[Rows]) -> tuple[torch.Tensor, ...]:
@@ -148,5 +147,5 @@ def _play_round(
     returns = np.array(rewards, np.float32)  # (steps, rows), discounted
     for t in reversed(range(len(rewards) - 1)):
         returns[t] += np.float32(settings.discount) * returns[t + 1] * goes_on[t]
-    returns[max(0, int(len(inputs) - _SETTLED / max(1e-3, 1 - settings.discount))) :] = np.nan
+    returns[int(len(inputs) - min(_SETTLED / max(1e-3, 1 - settings.discount), len(inputs) / 2)) :] = np.nan
     return np.concatenate(inputs[::_EVERY]), np.concatenate(chosen[::_EVERY]), returns[::_EVERY].reshape(-1)

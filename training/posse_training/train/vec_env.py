@@ -75,13 +75,16 @@ class TeamVecEnv(VecEnv):
         A seed given by :meth:`seed` restarts the worlds from episode 0 of that seed, once, and options given by
         :meth:`set_options` are those of :meth:`posse.Batch.reset` but ``reset_mask``, once.
         """
-        observations = np.concatenate([group.reset(self._seeds[0], self._options[0]) for group in self._groups])
+        groups, begun = self._groups, []
+        for k, group in enumerate(groups):
+            begun.append(group.reset(self._seeds[0], self._options[0], (k + 1) / len(groups)))
         self._reset_seeds()
         self._reset_options()
-        return observations
+        return np.concatenate(begun)
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Take the actions (slots, 2 + m) of the next step; ValueError as for :meth:`posse.Batch.step`."""
+        actions = np.asarray(actions)
         if actions.shape != (self.num_envs, self.action_length):
             raise ValueError(f"actions have shape {actions.shape}, wanted {(self.num_envs, self.action_length)}")
         parts = np.split(actions, np.cumsum([group.num_slots for group in self._groups])[:-1])
@@ -189,15 +192,18 @@ class SlotGroup:
         # Rewards of the present episode so far, (E, N).
         self._returns = np.zeros((worlds, trackers))
 
-    def reset(self, seed: int | None, options: dict[str, Any] | None = None) -> FloatArray:
-        """Start a shortened episode in every world; return the observations (slots, size)."""
+    def reset(self, seed: int | None, options: dict[str, Any] | None = None, share: float = 1.0) -> FloatArray:
+        """Start a shortened episode in every world; return the observations (slots, size).
+
+        The e-th of E worlds ends at (e + ``share``) / E of the horizon: shares of several groups interleave their ends.
+        """
         if isinstance(options, Mapping) and options.get("reset_mask") is not None:
             raise ValueError("reset_mask leaves episodes running, and slots all begin one: leave it out")
         raw = self.batch.reset(seed=seed, options=options)
         worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
         self.restart(np.ones(worlds, np.bool_))
         self._seen = raw
-        self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
+        self._cut_at = np.maximum(1, ((np.arange(worlds) + share) * horizon / worlds).astype(np.int64))
         return self.encode(raw)
 
     def restart(self, mask: BoolArray) -> None:
