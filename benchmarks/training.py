@@ -59,8 +59,8 @@ def main() -> None:
     last = curve_of(replace(plain, evaluate_worlds=1))[-1]
     print(f"PPO on smart: {last['steps'] / last['seconds']:,.0f} agent-steps/s, {s.threads} threads")
     if s.beat_steps:
-        steps = {"steps": s.beat_steps, "evaluate_every": s.beat_steps // 10}
-        print(time_to_beat(replace(default_settings("smart"), seed=s.seed, threads=s.threads, **steps)))
+        run = replace(default_settings("smart"), steps=s.beat_steps, evaluate_every=s.beat_steps // 10, seed=s.seed)
+        print(time_to_beat(replace(run, threads=s.threads)))
 
 
 if __name__ == "__main__":

@@ -154,21 +154,25 @@ def _first(given: Scenario | Family) -> Scenario:
 def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:
     if len(policies) != 1:
         raise SettingsError(f"a target ships from one run, these are {len(policies)}")
-    (policy,), scenario, (team, scripted, least) = policies, _first(trained[0].given[0]), REFERENCE
+    (policy,), scenario = policies, _first(trained[0].given[0])
     new = Target(settings.name, "agent", policy)
+    comparison = make_comparison(scenario, new, settings.worlds)
+    card = {**_card(settings.name, policy, trained[0]), "comparison": comparison}
+    return policy.with_card({**card, "check": make_target_check(REFERENCE[0], scenario, new)})
+
+
+def make_comparison(scenario: Scenario, new: Target, worlds: int) -> dict[str, Any]:
+    """Return what a target costs the reference team, compared with the scripted one; SettingsError if too little."""
+    team, scripted, least = REFERENCE
     played = {
-        target.name: evaluate(team, scenario, settings.worlds, TARGET_SEED, target=target, progress=False)
+        target.name: evaluate(team, scenario, worlds, TARGET_SEED, target=target, progress=False)
         for target in (load_target(scripted), new)
     }
-    cost = difference(played[scripted]["score"], played[settings.name]["score"])
+    cost = difference(played[scripted]["score"], played[new.name]["score"])
     if not cost.low >= least:
-        raise SettingsError(
-            f"{settings.name!r} costs {team} {cost} more than {scripted!r}: at least {least:g} is wanted"
-        )
-    comparison = {"team": team, "split": "test", "seed": TARGET_SEED, "worlds": settings.worlds}
-    comparison |= {"scores": {name: asdict(found.estimate("score")) for name, found in played.items()}}
-    card = {**_card(settings.name, policy, trained[0]), "comparison": {**comparison, "cost": asdict(cost)}}
-    return policy.with_card({**card, "check": make_target_check(team, scenario, new)})
+        raise SettingsError(f"{new.name!r} costs {team} {cost} more than {scripted!r}: at least {least:g} is wanted")
+    told = {"team": team, "split": "test", "seed": TARGET_SEED, "worlds": worlds, "cost": asdict(cost)}
+    return {**told, "scores": {name: asdict(found.estimate("score")) for name, found in played.items()}}
 
 
 def _card(name: str, policy: LearnedPolicy, run: TrainSettings) -> dict[str, Any]:
@@ -264,9 +268,9 @@ def command_of(settings: TrainSettings) -> str:
     return shlex.join(words)
 
 
-def _check_again(path: Path, check: dict[str, Any]) -> None:
+def _check_again(path: Path, check: dict[str, Any], **more: Any) -> None:
     policy = LearnedPolicy.from_file(path)
-    policy.with_card({**policy.card, "check": check, "checked_at": commit()}).save(path)
+    policy.with_card({**policy.card, "check": check, "checked_at": commit(), **more}).save(path)
     print(path.stem, *(f"{play['scenario']} {play['score']:.3f}" for play in check.get("plays", [check])))
 
 
@@ -278,8 +282,10 @@ def main() -> None:
             policy = LearnedPolicy.from_file(path)
             _check_again(path, make_check(policy, check_scenarios(policy.card["check"])))
         for path in sorted(SHIPPED_TARGETS.glob("*.safetensors")):
-            then = LearnedPolicy.from_file(path).card["check"]
-            _check_again(path, make_target_check(then["team"], get_scenario(then["scenario"]), load_target(path.stem)))
+            card, target = LearnedPolicy.from_file(path).card, load_target(path.stem)
+            scenario = get_scenario(card["check"]["scenario"])
+            comparison = make_comparison(scenario, target, card["comparison"]["worlds"])
+            _check_again(path, make_target_check(REFERENCE[0], scenario, target), comparison=comparison)
         return
     path = ship(settings)
     card = LearnedPolicy.from_file(path).card

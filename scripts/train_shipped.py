@@ -17,7 +17,7 @@ from posse_training.train.presets import default_settings
 from posse_training.train.settings import LAST, TrainSettings
 from posse_training.train.train import train
 
-CORRECTIONS: Final = ("smart", "field", "robots")
+CORRECTIONS: Final = ("smart", "field", "duel", "robots")
 """Scenarios with a team that corrects the script, ``corrected-SCENARIO``."""
 LEAGUE: Final = LeagueSettings(
     scenario="duel", generations=4, seed=1, target_steps=1_500_000, responses="none", folder=Path("runs/league-1")
@@ -27,10 +27,10 @@ EVADERS: Final = ("evader", "evader-2", "evader-3")
 DUEL: Final[dict[str, Any]] = {
     "target": ",".join(("smart", "constant", *OPEN_LOOP, *(each for each in EVADERS for _ in range(3)))),
     "num_worlds": 266,
-    "steps": 6_000_000,
-    "start": str(LEAGUE.path / "generation-04" / "trackers"),
 }
-"""Opponents of the team of ``duel``, the evaders with three shares each; it goes on from the league's last team."""
+"""Opponents of the teams of ``duel``, the evaders with three shares each."""
+AFTER_LEAGUE: Final[dict[str, Any]] = {"steps": 6_000_000, "start": str(LEAGUE.path / "generation-04" / "trackers")}
+"""How the one that learned from nothing goes on from the league's last team."""
 FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
@@ -59,11 +59,12 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
     runs = []
     for seed in settings.seed:
         for name in settings.scenario:
+            opponents = DUEL if name == "duel" else {}
             if name in CORRECTIONS:
-                corrects = default_settings(name, preset="residual")
+                corrects = replace(default_settings(name, preset="residual"), **opponents)
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
             if name in FROM_NOTHING:
-                learns = replace(default_settings(name), **(DUEL if name == "duel" else {}))
+                learns = replace(default_settings(name), **opponents, **(AFTER_LEAGUE if opponents else {}))
                 runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
 

@@ -185,7 +185,7 @@ def test_what_makes_no_difference(beams: int, memory: float) -> None:
     worlds = [posse.batch("constant", 40, message_size=5, target_speed=0.3, sonar_beams=count) for count in (8, beams)]
     usual, other = DDCS(FAMILY["ddcs-distributed"]), DDCS(FAMILY["ddcs-distributed"]).with_settings(turn_memory=memory)
     scores = [play(batch, team)["score"] for batch, team in zip(worlds, (usual, other), strict=True)]
-    np.testing.assert_allclose(*scores, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(scores[0], scores[1], rtol=1e-3, atol=1e-3)
 
 
 def test_delays_that_are_not_foreseen_are_refused() -> None:

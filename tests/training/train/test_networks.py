@@ -93,7 +93,7 @@ class _Circle(BasePolicy):
 def test_imitation_copies(tmp_path: Path, guard: bool) -> None:
     settings = small(tmp_path, imitate="circle", imitate_rounds=4, encoding="plain", target="smart", safeguard=guard)
     env = make_env(settings)
-    model = ALGORITHMS[settings.algorithm].make(settings, env)
+    model: Any = ALGORITHMS[settings.algorithm].make(settings, env)
     errors: list[float] = []
     statistics, before = RunningStatistics(env.encoding.size), model.policy.value_net.weight.clone()
     imitate(model, settings, env.encoding, _Circle(), statistics, lambda line: errors.append(float(line.split()[-1])))
