@@ -4,7 +4,8 @@
     python scripts/ship.py runs/train/duel-target-ppo-1 --name evader
     python scripts/ship.py --again     the checks of all that ship, after a scenario's version rose
 
-Of several runs that differ in their training seeds, the best on validation worlds that none was evaluated on ships.
+Of several runs that differ in their training seeds, the best on validation worlds that none was evaluated on ships,
+against the targets of its training.
 Then all play the worlds of the leaderboard, for the mean over training seeds. A target ships only if it costs the
 reference team more than the scripted one.
 """
@@ -13,6 +14,7 @@ import csv
 import dataclasses
 import shlex
 import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -107,7 +109,8 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
     if not settings.name.startswith(LEARNED):
         raise SettingsError(f"name={settings.name!r} must begin with {' or '.join(LEARNED)}")
     _check_one_training(settings.runs, trained)
-    plays = [_play(policy, trained[0].given, settings.worlds, CHOICE_SEED, SPLIT) for policy in policies]
+    choice = settings.worlds, CHOICE_SEED, SPLIT, tuple(Counter(trained[0].opponents).elements()) or (None,)
+    plays = [_play(policy, trained[0].given, *choice) for policy in policies]
     tests = [_play(policy, trained[0].given, settings.test_worlds, SEED, "test") for policy in policies]
     # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
     learned = [policy.card["steps"] > 0 for policy in policies]
@@ -139,10 +142,19 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
 
 
 def _play(
-    policy: LearnedPolicy, scenarios: Sequence[Scenario | Family], worlds: int, seed: int, split: str
+    policy: LearnedPolicy,
+    scenarios: Sequence[Scenario | Family],
+    worlds: int,
+    seed: int,
+    split: str,
+    targets: Sequence[str | None] = (None,),
 ) -> dict[str, npt.NDArray[np.float64]]:
-    """Return what a policy is judged by in each world, its mean over all scenarios and families."""
-    played = [evaluate(policy, scenario, worlds, seed, split=split) for scenario in scenarios]
+    """Return what a policy is judged by in each world, its mean over all scenarios, families and targets."""
+    played = [
+        evaluate(policy, scenario, worlds, seed, split=split, target=target)
+        for scenario in scenarios
+        for target in targets
+    ]
     return {name: np.mean([results[name] for results in played], axis=0) for name in _JUDGED}
 
 
