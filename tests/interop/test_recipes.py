@@ -14,7 +14,6 @@ LONG = {"record_video", "supersuit_vector", "gymnasium_vector", "minari_clone", 
 LONG |= {f"sb3_{kind}" for kind in ("recurrent", "shared", "solo", "team")}
 """Recipes that train, film or start processes."""
 
-
 NAMES = sorted(path.stem for path in RECIPES.glob("*.py"))
 OURS = [name for name in NAMES if name not in OWN_ENVIRONMENT]
 

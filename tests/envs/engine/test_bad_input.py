@@ -16,7 +16,6 @@ from posse.signals.layout import StateLayout
 
 WHOLE = r"must be a whole number in"
 
-
 OF_EVERY_KIND: list[tuple[dict[str, Any], str]] = [
     ({"scenario": "smrt"}, r"unknown scenario 'smrt' \(did you mean .*'smart'"),
     ({"scenario": np.zeros(2)}, r"unknown scenario array"),

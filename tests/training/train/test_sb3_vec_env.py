@@ -27,9 +27,8 @@ def make(worlds: int = 3, *, parts: int = 1, see_state: bool = False, **settings
 def begin(env: Any) -> Any:
     """Return the first observations of episodes that are not shortened."""
     observations = env.reset()
-    for name, array in env.arrays().items():
-        if name.endswith("cut_at"):
-            array[:] = env.batches[0].scenario.horizon
+    for k, batch in enumerate(env.batches):
+        env.arrays()[f"{k}.cut_at"][:] = batch.scenario.horizon
     return observations
 
 
