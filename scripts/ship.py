@@ -14,7 +14,6 @@ import csv
 import dataclasses
 import shlex
 import tempfile
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -109,13 +108,18 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
     if not settings.name.startswith(LEARNED):
         raise SettingsError(f"name={settings.name!r} must begin with {' or '.join(LEARNED)}")
     _check_one_training(settings.runs, trained)
-    choice = settings.worlds, CHOICE_SEED, SPLIT, tuple(Counter(trained[0].opponents).elements()) or (None,)
-    plays = [_play(policy, trained[0].given, *choice) for policy in policies]
-    tests = [_play(policy, trained[0].given, settings.test_worlds, SEED, "test") for policy in policies]
+    given, choice = trained[0].given, (settings.worlds, CHOICE_SEED, SPLIT)
+    plays = [_play(policy, given, *choice) for policy in policies]
+    tests = [_play(policy, given, settings.test_worlds, SEED, "test") for policy in policies]
     # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
     learned = [policy.card["steps"] > 0 for policy in policies]
     scores = [play["safe_score"].mean() for play in plays]
-    block = max(map(block_of, trained[0].given))
+    # Against the targets of the training, by their shares, unless each run had those of its own league.
+    targets = trained[0].opponents if all(run.opponents == trained[0].opponents for run in trained) else {}
+    if targets:
+        each = [[_play(policy, given, *choice, name)["safe_score"].mean() for name in targets] for policy in policies]
+        scores = list(np.average(each, axis=1, weights=list(targets.values())))
+    block = max(map(block_of, given))
     best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
     seeds = [
         {
@@ -133,10 +137,10 @@ def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequen
             **_card(settings.name, policies[best], trained[best]),
             "chosen_on": SPLIT,
             "training_seeds": seeds,
-            "choice": {"split": SPLIT, "seed": CHOICE_SEED, "worlds": settings.worlds},
+            "choice": {"split": SPLIT, "seed": CHOICE_SEED, "worlds": settings.worlds, "targets": targets},
             **{f"validation_{name}": float(plays[best][name].mean()) for name in _JUDGED},
             "curve": _curve(settings.runs[best]),
-            "check": make_check(policies[best], [_first(given) for given in trained[0].given]),
+            "check": make_check(policies[best], [_first(each) for each in given]),
         }
     )
 
@@ -147,14 +151,10 @@ def _play(
     worlds: int,
     seed: int,
     split: str,
-    targets: Sequence[str | None] = (None,),
+    target: str | None = None,
 ) -> dict[str, npt.NDArray[np.float64]]:
-    """Return what a policy is judged by in each world, its mean over all scenarios, families and targets."""
-    played = [
-        evaluate(policy, scenario, worlds, seed, split=split, target=target)
-        for scenario in scenarios
-        for target in targets
-    ]
+    """Return what a policy is judged by in each world, its mean over all scenarios and families."""
+    played = [evaluate(policy, scenario, worlds, seed, split=split, target=target) for scenario in scenarios]
     return {name: np.mean([results[name] for results in played], axis=0) for name in _JUDGED}
 
 
@@ -286,18 +286,27 @@ def _check_again(path: Path, check: dict[str, Any], **more: Any) -> None:
     print(path.stem, *(f"{play['scenario']} {play['score']:.3f}" for play in check.get("plays", [check])))
 
 
+def _check_all_again() -> None:
+    made: list[tuple[Path, dict[str, Any], dict[str, Any]]] = []
+    for path in sorted(SHIPPED_TARGETS.glob("*.safetensors")):
+        card, target = LearnedPolicy.from_file(path).card, load_target(path.stem)
+        scenario = get_scenario(card["check"]["scenario"])
+        comparison = make_comparison(
+            scenario, target, card["comparison"]["worlds"]
+        )  # may refuse, before any is written
+        made.append((path, make_target_check(REFERENCE[0], scenario, target), {"comparison": comparison}))
+    for path in sorted(SHIPPED.glob("*.safetensors")):
+        policy = LearnedPolicy.from_file(path)
+        made.append((path, make_check(policy, check_scenarios(policy.card["check"])), {}))
+    for path, check, more in made:
+        _check_again(path, check, **more)
+
+
 def main() -> None:
     """Ship, or check all that ships anew."""
     settings = tyro.cli(Settings, description=__doc__)
     if settings.again:
-        for path in sorted(SHIPPED.glob("*.safetensors")):
-            policy = LearnedPolicy.from_file(path)
-            _check_again(path, make_check(policy, check_scenarios(policy.card["check"])))
-        for path in sorted(SHIPPED_TARGETS.glob("*.safetensors")):
-            card, target = LearnedPolicy.from_file(path).card, load_target(path.stem)
-            scenario = get_scenario(card["check"]["scenario"])
-            comparison = make_comparison(scenario, target, card["comparison"]["worlds"])
-            _check_again(path, make_target_check(REFERENCE[0], scenario, target), comparison=comparison)
+        _check_all_again()
         return
     path = ship(settings)
     card = LearnedPolicy.from_file(path).card

@@ -109,7 +109,7 @@ def check_policy(policy: object) -> None:
     """Raise TypeError for what is no policy, PolicyError for one of a target."""
     if isinstance(policy, type) or not isinstance(policy, Policy):
         make = "load() makes one of a name, from_function() of a function; your own class extends BasePolicy"
-        raise TypeError(f"{policy!r:.100} is no policy, with all that posse_baselines.Policy has: {make}")
+        raise TypeError(f"{policy!r:.100} is no policy: it lacks what posse_baselines.Policy has; {make}")
     if getattr(policy, "side", "trackers") == "target":
         raise PolicyError(f"policy {policy.name!r} moves a target: give it as target=, or --target")
 

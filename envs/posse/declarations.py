@@ -67,6 +67,9 @@ def place_of(function: Function) -> str:
     return f"{plain(function).__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
 
 
+_STORES: Final = ("STORE_ATTR", "STORE_SUBSCR")
+
+
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number; truth values are none."""
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
@@ -154,7 +157,7 @@ class Declaration:
             raise self.error(f"its parameters are {given}, not {allowed}", function)
         if not given.startswith("(c"):
             return function  # type: ignore[no-any-return]
-        stores = any(step.opname == "STORE_ATTR" for step in dis.get_instructions(plain(function)))
+        stores = any(step.opname in _STORES for step in dis.get_instructions(plain(function)))
         if stores and not self.built_in and not isinstance(self, target_motion):
             raise self.error("it assigns to a field of a record, as target motions alone may: return a value", function)
         working: Function = compiled(plain(function))
@@ -289,8 +292,8 @@ class field(Declaration):  # noqa: N801 (used as a function is)
     def _bound(self, name: str, scenario: Any) -> float:
         """Return a bound in a scenario; raise DeclarationError unless it is a finite number."""
         value = self._value(name, scenario)
-        if not is_number(value) or abs(value) > np.finfo(np.float32).max:
-            raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number of 32 bits")
+        if not is_number(value) or abs(value) > float(np.finfo(np.float32).max):
+            raise self.error(f"{name}={value!r} in {scenario.name!r} is not a finite number that fits float32")
         return float(value)
 
 

@@ -94,7 +94,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
         state["seconds"] = time.monotonic() - started
         write_json(folder / STATE, state, indent=None)
     if curve[-1]["steps"] < generations * each:  # also where a run is ended by fewer steps
-        evaluate(generations * each)  # off the schedule, so not kept: a run goes on as if uninterrupted
+        evaluate(generations * each)
+        write_json(folder / STATE, state, indent=None)
     team([cma.mean]).with_card(make_card(s, steps=generations * each, curve=curve)).save(folder / LAST)
     return folder / BEST
 
@@ -133,7 +134,7 @@ class Candidates(LearnedPolicy):
             shard = range(first + worlds.start, first + worlds.stop)
             for one, numbers in blocks(pair.scenario, shard, **where):
                 target = cast("Any", pair.opponent)
-                whole = one.replace(terminate_on_contact=False)
+                whole = one.replace(terminate_on_contact=False)  # as in evaluations: scores are of whole episodes
                 batch = batch_for(self, whole, count * len(numbers), target, num_threads=num_threads, **where)
                 batch.reset()
                 batch.arrays.world["index"] = np.tile(numbers, count)

@@ -176,6 +176,7 @@ class _Run:
         for name in settings.only:
             if name not in known:
                 raise SettingsError(f"only: {unknown(f'tunable setting of {settings.policy!r}', name, known)}")
+        # As in evaluations: scores are of whole episodes.
         self.scenario = scenario_or_family(settings.scenario, terminate_on_contact=False)
         self.scores: list[list[float]] = []  # of the candidates of each generation
         self.curve: list[dict[str, Any]] = []  # scores of the search's mean on validation worlds, the defaults' first

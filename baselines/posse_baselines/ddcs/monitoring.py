@@ -191,7 +191,7 @@ def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
         noise = (1.0 - settings.heading_trust) * wrap(psi - psi_guess)
         theta, psi = wrap(theta - noise), wrap(psi - noise)
         turned = wrap(theta - me.fix_theta)
-        if time <= max(settings.turn_memory, 1.5 * team.world.dt):  # of fixes of two steps, always
+        if time <= max(settings.turn_memory, 1.5 * team.world.dt):  # always, of fixes of successive steps
             me.target_turn = turned / time
             along = dot(position - me.fix, vector(1.0, me.fix_theta + 0.5 * turned)) / time
             share = 1.0 - math.exp(-time / _SPEED_MEMORY) if me.speed_known else 1.0
@@ -252,6 +252,7 @@ def foresee(team: Team, me: Record) -> None:
     if me.known:
         me.target, me.target_theta = target_after(team, me, me.fix_age + team.world.lead)
         me.target_velocity = vector(me.target_speed, me.target_theta)
+        # Under PNGL the rate is that of a target on a circle; the heading foreseen with a decaying turn rate lags.
         most = me.psi_limit * team.world.lead
         lag = clip(wrap(me.target_theta - angle_of(me.frame)), -most, most)
         me.frame *= vector(1.0, me.psi_rate * team.world.lead if team.settings.pngl else lag)

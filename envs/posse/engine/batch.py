@@ -253,7 +253,7 @@ class Batch(OwnArrays):
         if not self._started and not chosen.all():
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         poses = poses_of(given, self.scenario, self.num_worlds)
-        before, world, started = self.arrays.copy(), self.arrays.world, self._started
+        before, world = self.arrays.copy(), self.arrays.world
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"][chosen] = SPLITS.index(self.split)
@@ -269,8 +269,7 @@ class Batch(OwnArrays):
                 observations = self._execute(START_FROM_POSES, chosen)
         except BaseException:
             self.arrays.write(before)
-            self._started = started
-            if started:
+            if self._started:
                 self.observe()  # and note again what follows from the state
             raise
         self.seed, self._started = new_seed, True
@@ -375,15 +374,10 @@ class Batch(OwnArrays):
         """
         arguments = self._fixed, self._orders if orders is None else orders, actions, results
         threads = len(self._fixed.scratch)
-        try:
-            if threads == 1:  # as over_worlds() does, which would take a tenth longer for one world
-                self._over = self._kernel(*arguments, 0, 0, self.num_worlds)
-            else:
-                agents = self.scenario.num_agents
-                self._over = sum(over_worlds(self._kernel, arguments, self.num_worlds, agents, threads))
-        except Exception as error:  # of a user's function; worlds are left within the step
-            self._started = False
-            raise DeclarationError(f"a declared function raised {error!r}: only a reset helps") from error
+        if threads == 1:  # as over_worlds() does, which would take a tenth longer for one world
+            self._over = self._kernel(*arguments, 0, 0, self.num_worlds)
+        else:
+            self._over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         if self._own_terms and not np.isfinite(results.rewards).all():
             check_terms(self._declared.reward_terms, results.terms)
         if self._own_rules and not np.isfinite(results.observations).all():

@@ -147,5 +147,6 @@ def _play_round(
     returns = np.array(rewards, np.float32)  # (steps, rows), discounted
     for t in reversed(range(len(rewards) - 1)):
         returns[t] += np.float32(settings.discount) * returns[t + 1] * goes_on[t]
-    returns[int(len(inputs) - min(_SETTLED / max(1e-3, 1 - settings.discount), len(inputs) / 2)) :] = np.nan
+    settled = len(inputs) - min(_SETTLED / max(1e-3, 1 - settings.discount), len(inputs) / 2)
+    returns[max(1, int(settled)) :] = np.nan
     return np.concatenate(inputs[::_EVERY]), np.concatenate(chosen[::_EVERY]), returns[::_EVERY].reshape(-1)

@@ -30,7 +30,8 @@ class TeamVecEnv(VecEnv):
 
     Truncated slots are bootstrapped one call each, so episodes should not all end together: each world's *first*
     episode is shortened, the e-th of E worlds to (e + 1) / E of the horizon, which spreads all later ends evenly over
-    time. A shortened episode is truncated and bootstrapped like any other, but reports neither return nor metrics.
+    time; the worlds of several batches take turns. A shortened episode is truncated and bootstrapped like any other,
+    but reports neither return nor metrics.
 
     Every array returned is new and is never overwritten.
 
