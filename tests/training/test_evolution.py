@@ -90,3 +90,8 @@ def test_candidates_play_the_same_worlds_as_alone(tmp_path: Path) -> None:
     alone = [Candidates(settings, weights[k : k + 1]).scores(5, None)[0] for k in range(3)]
     assert together == pytest.approx(alone, abs=0.002)  # longer episodes would amplify rounding
     assert np.ptp(alone) > 0.05
+    bare, scores = {**changes, "advise": None, "safeguard": False, "target": "smart,evader"}, []
+    for ends in (False, True):  # by contact, which scores ignore
+        bare["overrides"] = {**changes["overrides"], "terminate_on_contact": ends}
+        scores.append(Candidates(small(tmp_path, "cmaes", **bare), 20 * weights[..., :15]).scores(5, None))
+    assert scores[0] == scores[1]
