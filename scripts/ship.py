@@ -291,9 +291,8 @@ def _check_all_again() -> None:
     for path in sorted(SHIPPED_TARGETS.glob("*.safetensors")):
         card, target = LearnedPolicy.from_file(path).card, load_target(path.stem)
         scenario = get_scenario(card["check"]["scenario"])
-        comparison = make_comparison(
-            scenario, target, card["comparison"]["worlds"]
-        )  # may refuse, before any is written
+        # It may refuse a target: before any file is written.
+        comparison = make_comparison(scenario, target, card["comparison"]["worlds"])
         made.append((path, make_target_check(REFERENCE[0], scenario, target), {"comparison": comparison}))
     for path in sorted(SHIPPED.glob("*.safetensors")):
         policy = LearnedPolicy.from_file(path)

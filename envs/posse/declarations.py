@@ -67,7 +67,7 @@ def place_of(function: Function) -> str:
     return f"{plain(function).__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
 
 
-_STORES: Final = ("STORE_ATTR", "STORE_SUBSCR")
+_STORES: Final = ("STORE_ATTR", "STORE_SUBSCR")  # instructions of Python that assign to a field
 
 
 def is_number(value: object) -> bool:
