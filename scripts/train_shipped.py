@@ -64,7 +64,7 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
                 corrects = replace(default_settings(name, preset="residual"), **opponents)
                 runs.append(replace(corrects, seed=seed, folder=settings.out / f"corrected-{name}-{seed}"))
             if name in FROM_NOTHING:
-                learns = replace(default_settings(name), **opponents, **(AFTER_LEAGUE if opponents else {}))
+                learns = replace(default_settings(name), **opponents, **(AFTER_LEAGUE if name == "duel" else {}))
                 runs.append(replace(learns, seed=seed, folder=settings.out / f"learned-{name}-{seed}"))
     return runs
 

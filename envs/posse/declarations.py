@@ -67,9 +67,6 @@ def place_of(function: Function) -> str:
     return f"{plain(function).__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
 
 
-_STORES: Final = ("STORE_ATTR", "STORE_SUBSCR")  # instructions of Python that assign to a field
-
-
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number; truth values are none."""
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
@@ -133,10 +130,10 @@ class Declaration:
 
     def _check(self) -> None:
         """Raise DeclarationError for an invalid declaration."""
-        for attribute, (allowed, _) in self.signatures.items():
+        for attribute, (allowed, returns) in self.signatures.items():
             function = getattr(self, attribute)
             if attribute == "function" or function is not None:
-                setattr(self, attribute, self._checked(function, allowed))
+                setattr(self, attribute, self._checked(function, allowed, returns))
         name: Any = self.name
         unit: Any = self.unit
         if not isinstance(name, str) or not name.replace(self.marks[-1], "_").isidentifier():
@@ -146,8 +143,11 @@ class Declaration:
         if not isinstance(unit, str) or not unit:
             raise self.error(f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
 
-    def _checked(self, function: Any, allowed: str) -> Function:
-        """Return a function, compiled if kernels call it; raise DeclarationError if it has other parameters."""
+    def _checked(self, function: Any, allowed: str, returns: str) -> Function:
+        """Return a function, compiled if kernels call it.
+
+        DeclarationError if it has other parameters, or writes to a record though it is to return a value.
+        """
         if not isinstance(plain(function), FunctionType):
             raise self.error(f"declare a function, made by def, not a {type(function).__name__}", function)
         signature = inspect.signature(plain(function))
@@ -155,12 +155,12 @@ class Declaration:
         given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
         if given not in allowed.split(" or "):
             raise self.error(f"its parameters are {given}, not {allowed}", function)
-        if not given.startswith("(c"):
-            return function  # type: ignore[no-any-return]
-        stores = any(step.opname in _STORES for step in dis.get_instructions(plain(function)))
-        if stores and not self.built_in and not isinstance(self, target_motion):
-            raise self.error("it assigns to a field of a record, as target motions alone may: return a value", function)
-        working: Function = compiled(plain(function))
+        in_kernels = given.startswith("(c")
+        if in_kernels and returns != "nothing" and not self.built_in:
+            steps = dis.get_instructions(plain(function))
+            if any(step.opname in ("STORE_ATTR", "STORE_SUBSCR") for step in steps):
+                raise self.error("it assigns to a field of a record, as motions alone may: return a value", function)
+        working: Function = compiled(plain(function)) if in_kernels else function
         return working
 
     @property

@@ -144,6 +144,6 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
             # The leader of the centralized model takes the first slot.
             if settings.centralized and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
-            cost[j, k] = time + 1e-4 * j * k / n  # of equally good assignments all find one
+            cost[j, k] = time + 1e-4 * j * k / n  # so all choose the same of equal assignments
     assign(cost, work.assigning)
     me.slot = int(work.assigning[0, me.number])

@@ -76,9 +76,8 @@ class TeamVecEnv(VecEnv):
         A seed given by :meth:`seed` restarts the worlds from episode 0 of that seed, once, and options given by
         :meth:`set_options` are those of :meth:`posse.Batch.reset` but ``reset_mask``, once.
         """
-        groups, begun = self._groups, []
-        for k, group in enumerate(groups):
-            begun.append(group.reset(self._seeds[0], self._options[0], (k + 1) / len(groups)))
+        seed, options, count = self._seeds[0], self._options[0], len(self._groups)
+        begun = [group.reset(seed, options, (k + 1) / count) for k, group in enumerate(self._groups)]
         self._reset_seeds()
         self._reset_options()
         return np.concatenate(begun)
