@@ -19,6 +19,7 @@ import keyword
 import math
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from types import FunctionType
@@ -67,9 +68,10 @@ def place_of(function: Function) -> str:
     return f"{plain(function).__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
 
 
-def is_number(value: object) -> bool:
+def is_number(value: Any) -> bool:
     """Return whether a value is a finite number; truth values are none."""
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    return real and (abs(value) <= sys.float_info.max if isinstance(value, int) else math.isfinite(value))
 
 
 D = TypeVar("D", bound="Declaration")

@@ -97,6 +97,9 @@ def test_what_is_older_than_the_first_observation_counts_as_of_then() -> None:
         robot = copy.deepcopy(robot) if k == 3 else robot  # which goes on as the first
         row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(3.0, 0.0, 0.0, age=0.3))
         ages.append(float(robot.layout.views(row)["target_age"]))
+        told = robot.broadcast().fix
+        assert told is not None
+        assert told.age == pytest.approx(0.3), "team-mates are told the true age"
     assert ages == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.3, 0.3])
     for _ in range(robot.scenario.horizon):
         row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0)
@@ -114,6 +117,29 @@ def test_of_what_is_older_the_newest_is_taken(order: int) -> None:
         v = robot.layout.views(robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, fix, heard=heard))
         assert [*v["target_range"].flat, v["neighbour_range"][0]] == [2.0, 20.0]
     assert np.isfinite(v["target_velocity"]).all()
+
+
+@pytest.mark.parametrize(("phase", "jitter"), [(0.02, 0.0), (0.0, 0.02)])  # s
+def test_ages_and_velocity_of_a_lost_target_stay_right_whenever_each_robot_steps(phase: float, jitter: float) -> None:
+    robots, seen = [Robot("constant", i, radio_delay=1) for i in range(5)], 5.0
+    sent: list[tuple[float, Heard]] = []
+    late = np.random.default_rng(3).uniform(-jitter, jitter, (80, 5))
+    for time, i in sorted((0.1 * k + phase * i + late[k, i], i) for k in range(80) for i in range(5)):
+        fix = TargetFix(0.6 * time, 0.0, 0.0) if i == 0 and time < seen else None
+        heard = [m._replace(age=time - at) for at, m in sent if m.number != i and 0.015 <= time - at < 0.115]
+        v = robots[i].layout.views(robots[i].observe((0.0, 0.0, 0.0), 0.0, 0.0, fix, heard=heard))
+        sent.append((time, robots[i].broadcast()))
+        if time > seen + 1.0:
+            assert v["target_age"] == pytest.approx(time - (seen - 0.1), abs=0.1 + jitter)  # whole steps
+            assert v["target_velocity"][0] == pytest.approx(0.6, abs=0.02 + 12 * jitter)  # over 0.1 s +- 2 jitter
+
+
+def test_of_two_messages_of_one_step_the_newer_is_observed() -> None:
+    told = [Heard(1, 10.0 - 100.0 * age, 0.0, 0.0, 0.0, 0.0, age=age) for age in (0.0, 0.04)]
+    for heard in (told, told[::-1]):
+        robot = Robot("constant", 0, radio_delay=1)
+        row = robot.observe((0.0, 0.0, 0.0), 0.0, 0.0, heard=heard)
+        assert robot.layout.views(row)["neighbour_range"][0] == 10.0
 
 
 def test_a_robot_drives_where_no_start_of_the_scenario_fits() -> None:
@@ -153,6 +179,7 @@ def test_invalid_measurements_are_refused() -> None:
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, age=math.nan)]), "age=nan"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [(0, 0, 0, 0, 0, 0, (), None, None)]), "age=None"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5)]), "a message of 1"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [(0, 0, 0, 0, 0, 0, (), None, 10**400)]), r"age=10+\.* must be"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, 1.0), "fix=1.0 must be"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, [1.0]), f"{beams} distances"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, ["1"] * beams), "sonar"),
@@ -172,7 +199,8 @@ def test_invalid_measurements_are_refused() -> None:
     for number in (9, 1.5):
         with pytest.raises(ValueError, match=f"number={number}"):
             Robot("field", number)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="scale=0"):
-        Robot("field", 0, scale=0)
+    for scale in (0, 1e300, np.complex64(1)):
+        with pytest.raises(ValueError, match=r"scale=.* must be from 0\.001 to 1000"):
+            Robot("field", 0, scale=scale)  # type: ignore[arg-type]
     with pytest.raises(PolicyError, match="reads the state"):
         deploy(load("planner"), robot)

@@ -100,14 +100,15 @@ class Robot:
             raise ScenarioError(f"sensor={self.scenario.sensor!r} gives bearings; a robot needs a sensor of positions")
         if check_count("number", number, 0) >= self.scenario.num_trackers:
             raise ValueError(f"number={number} must be from 0 to {self.scenario.num_trackers - 1}, one of the team's")
-        if not (is_number(scale) and scale > 0):
-            raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
-        self.number, self.scale = number, scale
+        if not (is_number(scale) and 1e-3 <= scale <= 1e3):
+            raise ValueError(f"scale={scale!r:.80} must be from 0.001 to 1000: scenario metres per metre of the robot")
+        self.number, self.scale = int(number), float(scale)
         self.layout = ObservationLayout(self.scenario)
         lossy = max(self.scenario.radio_loss, _BARELY_LOSSY)  # worlds with a perfect radio store no messages
         self._world = Batch(self.scenario.replace(radio_loss=lossy), 1, num_threads=1)
         self.reset()
         self.observe((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0))  # compiles, which would halt a control loop
+        self.command(np.zeros(2 + self.scenario.message_size))
         self.reset()
 
     def reset(self) -> None:
@@ -118,7 +119,8 @@ class Robot:
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
         self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
-        self._newest: dict[int, int] = {}  # step of each team-mate's last pose and, by the own number, of the last fix
+        # In steps: when each team-mate's last pose was measured and, by the own number, the last fix.
+        self._newest: dict[int, float] = {}
         self._message = (0.0,) * self.scenario.message_size
         self._sent: Heard | None = None
 
@@ -216,7 +218,7 @@ class Robot:
             float(me.fix.x) / self.scale,
             float(me.fix.y) / self.scale,
             math.atan2(me.fix.sin, me.fix.cos),
-            (self.steps - int(me.fix_step)) * self.scenario.control_step,
+            (self.steps - self._newest[self.number]) * self.scenario.control_step,
             math.atan2(me.fix.frame_sin, me.fix.frame_cos),
         )
 
@@ -246,21 +248,23 @@ class Robot:
         _check_age(checked.age)
         return checked
 
-    def _step_of(self, number: int, age: float) -> int | None:
-        """Return the step of a pose or fix, the first one if it is older; ``None``: it is not newer than the last."""
-        step = self.steps - round(age / self.scenario.control_step)
-        if step <= self._newest.get(number, -math.inf):
+    def _when(self, number: int, age: float) -> float | None:
+        """Return when (steps) a pose or fix was measured, at least 0; ``None``: it is no newer one."""
+        when = self.steps - age / self.scenario.control_step
+        # One fix comes by several team-mates, whose steps begin at other times: it must be newer by most of a step.
+        if when <= self._newest.get(number, -math.inf) + 0.8 * (number == self.number):
             return None
-        self._newest[number] = step
-        return max(0, step)
+        self._newest[number] = when
+        return max(0.0, when)
 
     def _take(self, fix: TargetFix) -> None:
         """Take a fix, if it is newer than the last one, as a tracker of a world does."""
-        me, step = self._me, self._step_of(self.number, fix.age)
-        if step is None:
+        me, when = self._me, self._when(self.number, fix.age)
+        if when is None:
             return
-        if step == me.fix_step:  # both are older than the first observation
-            me.fix_step = -1
+        # A step after the last fix if both round to the same one: no velocity has been measured within a step.
+        step = max(round(when), min(math.ceil(when - 1e-6), int(me.fix_step) + 1))
+        me.fix_step = min(me.fix_step, step - 1)  # if both are older than the first observation
         new = np.zeros(1, BROADCAST)
         new["fix_step"] = step
         _place(new[0].fix, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
@@ -271,10 +275,10 @@ class Robot:
 
     def _hear(self, message: Heard) -> None:
         """Store a message, unless a later one of the same team-mate was heard, and take its fix."""
-        arrays, step = self._world.arrays, self._step_of(message.number, message.age)
+        arrays, when = self._world.arrays, self._when(message.number, message.age)
         heard = arrays.heard[0, self.number, message.number]
-        if step is not None:
-            heard.step = step
+        if when is not None:
+            heard.step = math.floor(when + 0.5)  # round() would alternate at halves
             _place(heard, message.x * self.scale, message.y * self.scale, message.heading)
             heard.speed, heard.turn_rate = message.speed * self.scale, message.turn_rate
             arrays.heard_message[0, self.number, message.number] = message.message or 0.0
@@ -302,7 +306,7 @@ def _place(record: Any, x: float, y: float, heading: float, prefix: str = "headi
 
 def _check_age(age: float) -> None:
     if not (is_number(age) and age >= 0.0):
-        raise ValueError(f"age={age!r} must be the seconds since then, at least 0")
+        raise ValueError(f"age={age!r:.80} must be the seconds since then, at least 0")
 
 
 def _finite(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
