@@ -17,6 +17,10 @@ from posse_training import evaluate
 from posse_training.evaluation.statistics import mean
 
 SHORT: dict[str, Any] = {"horizon": 40, "settle_time": 1.0}
+MANY = (
+    *("tracker_turn_rate", "tracker_acceleration", "actuator_lag", "obstacle_gap", "sensing_range"),
+    *("field_of_view", "sonar_range", "radio_range", "forget_after", "outage_time"),
+)
 OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.0), **SHORT)
 
 
@@ -51,6 +55,7 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
         ({"target_speed": (0.7, 0.3)}, "least must not be above the greatest"),
         ({"target_speed": (0.3, 0.4, 0.5)}, "two numbers"),
         ({"target_speed": (0.3, 2.0)}, "below tracker_speed"),
+        ({"target_speed": (0.3, 2.0), **dict.fromkeys(MANY, (1.0, 2.0))}, "below tracker_speed"),
         ({"target_speed": (-1, 0.5)}, "target_speed=-1"),
         ({"num_trackers": (3, 5)}, "need num_neighbours"),
         ({"horizon": (100, 200)}, "cannot vary horizon"),

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import Declarations, reward_term
-from posse.numeric import UNCOMPILED, WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
+from posse.numeric import WIDTH, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.numeric.compile import stamp
 from posse.numeric.lanes import fetch
 from posse.rules.contact import find_contacts
@@ -207,7 +207,7 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
             over += advance_worlds(e, min(e + WIDTH, end), fixed, orders, actions, results, made, scratch)
         return over
 
-    return np.errstate(over="ignore", under="ignore")(advance) if UNCOMPILED else advance  # compiled code does not warn
+    return advance
 
 
 def direct(function: Callable[..., int]) -> Callable[..., int]:

@@ -46,7 +46,7 @@ def kernel(function: F) -> F:
     if a source of posse changes, or anything that a function from elsewhere reaches (:func:`stamp`).
     """
     if UNCOMPILED:
-        return function
+        return np.errstate(over="ignore", under="ignore")(function)  # compiled code does not warn
     dispatcher: Any = registry.CPUDispatcher(function, {}, _OPTIONS, _Compiler)
     dispatcher._cache = _Cache(function)
     return cast("F", dispatcher)

@@ -54,8 +54,9 @@ class Family:
                 "team sizes of a family need num_neighbours, so that all observations have one length",
             )
         fields = Declarations.of(self.base).fields
-        corners = itertools.product(*(dict.fromkeys(bounds) for _, bounds in self.ranges))
-        for values in itertools.islice(corners, 1024):  # of many ranges, some
+        corners = (itertools.product(*(bounds[::way] for _, bounds in self.ranges)) for way in (1, -1))
+        some = (itertools.islice(each, 512) for each in corners)  # of many ranges: each end occurs
+        for values in dict.fromkeys(itertools.chain(*some)):
             one = self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
             if Declarations.of(one).fields != fields:
                 fail("extra_fields", one.extra_fields, "a field's when= must be alike for all scenarios of a family")

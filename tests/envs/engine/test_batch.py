@@ -94,7 +94,8 @@ TEAMS: dict[str, tuple[int, dict[str, Any]]] = {
 def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
     make: dict[str, Any] = {"seed": 11, "horizon": 25, "message_size": 1, "settle_time": 1.0}
     worlds, team = TEAMS.get(name, (2, {}))
-    return play(posse.batch(name, worlds, **{**make, **team}), steps)
+    results = play(batch := posse.batch(name, worlds, **{**make, **team}), steps)
+    return [*results, batch.copies(2).state["tracker_broken_at"]]
 
 
 LONG = (("accelerating", 30), ("constant", 3), ("search", 3), ("radio", 1), ("duel", 1))
