@@ -180,6 +180,23 @@ def test_what_cannot_be_recorded_or_played_is_named() -> None:
         rollout(posse.batch("constant", 1), load("idle"), options=5)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("name", ["belief-planner", "ddcs-tuned", "learned-radio"])
+def test_a_memory_that_is_written_back_goes_on_as_before(name: str) -> None:
+    policy: Any = load(name)
+    batch = posse.batch("radio", 2, seed=1, message_size=policy.message_size)
+    memory, observations = policy.begin(batch.layout, 2), batch.reset()
+    for step in range(40):
+        if step == 30:
+            saved, restored = policy.arrays(memory), policy.begin(batch.layout, 2)
+            for field, array in policy.arrays(restored).items():
+                array[...] = saved[field]
+        actions, memory = policy.act(observations, memory)
+        if step >= 30:
+            again, restored = policy.act(observations, restored)
+            np.testing.assert_array_equal(again, actions)
+        observations = batch.step(actions)[0]
+
+
 def test_a_memory_that_cannot_be_saved_or_restarted_is_refused() -> None:
     with pytest.raises(PolicyError, match=r"'idle' cannot be saved: define its method arrays\(memory\)"):
         BasePolicy.arrays(load("idle"), np.zeros(3))  # type: ignore[arg-type]

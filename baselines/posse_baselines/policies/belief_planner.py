@@ -7,6 +7,7 @@ corrects the present by what the engine makes of it, and is not rolled forward o
 
 import math
 from dataclasses import replace
+from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 
 from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, Records, record_type
-from posse.rules import DART_TURN, NEVER, PATIENCE
+from posse.rules import DART_TURN, NEVER, PATIENCE, parts
 from posse.scenarios.scenario import FARTHEST
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.memory import Minds, unit_of
@@ -142,6 +143,13 @@ class Beliefs(Minds):
         self._told.heard[:, mask], self._told.fixed[:, mask], self._told.played[:, mask] = False, False, 0.0
         self._particles[mask] = self._drawn
         self.search.restart(mask)
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the memory, field by field, as views."""
+        teams, more = self.search.teams, {"newest": self.newest, "age": self.age, **self._told._asdict()}
+        records = {"seen": self._seen, "particles": self._particles, "ways": teams.ways, "plans": teams.plans}
+        held = (parts(name, array) for name, array in (records | more).items())
+        return {**super().arrays(), **self._past.by_name(), **dict(chain(*held))}
 
     def plan(self, observations: FloatArray) -> FloatArray:
         """Bring the worlds up to the present by observations (E, N, F); return each tracker's own action, (R, 2)."""

@@ -5,7 +5,7 @@ The names below are public: records, constants and functions for policies and us
 
 from posse.rules.kinematics import arc, in_frame
 from posse.rules.randomness import SENSOR_NOISE, TARGET, between, normal_pair, uniform
-from posse.rules.state import CONFIG, NEVER, TRACKER, beam_directions, config_record, slot_records, world_record
+from posse.rules.state import CONFIG, NEVER, TRACKER, beam_directions, config_record, parts, slot_records, world_record
 from posse.rules.targets.smart import DART_TURN, PATIENCE
 from posse.scenarios.setting import SPLITS
 
@@ -24,6 +24,7 @@ __all__ = [
     "config_record",
     "in_frame",
     "normal_pair",
+    "parts",
     "slot_records",
     "uniform",
     "world_record",

@@ -339,16 +339,15 @@ class WorldArrays(NamedTuple):
 
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
-        return {
-            name: part for name, array in zip(self._fields, self, strict=True) for name, part in _parts(name, array)
-        }
+        return {name: part for name, array in zip(self._fields, self, strict=True) for name, part in parts(name, array)}
 
 
-def _parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+def parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """Yield every field of an array of records, or the array itself, by name, as a view."""
     if array.dtype.names is None:
         yield name, array.view()
     for part in array.dtype.names or ():
-        yield from _parts(f"{name}_{part}", array[part])
+        yield from parts(f"{name}_{part}", array[part])
 
 
 def slot_records(scenario: Scenario) -> Records:
