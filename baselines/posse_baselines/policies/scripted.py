@@ -33,13 +33,11 @@ MEANINGS: Final = {
     "ddcs-centralized-pursuit": "a leader under velocity pursuit, followers under l-φ",
     "ddcs-distributed": "every tracker holds its own slot by the slot law",
     "ddcs-centralized": "a leader that holds its slot, followers under l-φ",
-    "ddcs-centralized-no-exchange": "the first leader stays leader, even when broken",
-    "ddcs-no-radio": "ddcs-distributed that ignores messages",
+    "ddcs-centralized-no-exchange": "ablation: the first leader stays leader, even when broken",
+    "ddcs-no-radio": "ablation: ddcs-distributed that ignores messages",
     "ddcs-tuned": "ddcs-distributed with settings tuned for the scenario",
     "pngl-l-phi-tuned": "pngl-l-phi with settings tuned for the scenario",
     "belief-planner": "plays ahead in a world of each tracker's own, written from what it observes",
     "planner": "a reference that reads the state and plays ahead in copies of the world",
 }
 """Of each a sentence, as ``posse policies`` shows it."""
-ABLATIONS: Final = ("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-no-exchange", "ddcs-no-radio")
-"""Policies that show what one part of another is good for; ``posse policies`` leaves them out."""

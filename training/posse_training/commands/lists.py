@@ -26,9 +26,6 @@ class _Scenarios:
 class _Policies:
     """List the policies."""
 
-    all: bool = False
-    """List ablations, too: policies that show what one part of another is good for."""
-
 
 def scenarios(arguments: Sequence[str]) -> None:
     """List the scenarios with their differences from ``constant``, and families, or all settings of one."""
@@ -54,19 +51,17 @@ def scenarios(arguments: Sequence[str]) -> None:
 
 def policies(arguments: Sequence[str]) -> None:
     """List the policies, each with a sentence."""
-    which = tyro.cli(_Policies, prog="posse policies", args=arguments)
-    from posse_baselines.policies.scripted import ABLATIONS, MEANINGS
+    tyro.cli(_Policies, prog="posse policies", args=arguments)
+    from posse_baselines.policies.scripted import MEANINGS
     from posse_baselines.registry import shipped
 
-    rows = [(name, text) for name, text in MEANINGS.items() if which.all or name not in ABLATIONS]
+    rows = [*MEANINGS.items()]
     for name in shipped():
         kind, _, scenario = name.partition("-")
         where = "two families and radio" if scenario == "generalist" else scenario
         learned = "a correction of ddcs-tuned, learned" if kind == "corrected" else "learned"
         rows.append((name, f"{learned} on {where}"))
     _show(("policy", "what it does"), rows)
-    if not which.all:
-        print("\nposse policies --all lists ablations, too")
 
 
 def _show(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
