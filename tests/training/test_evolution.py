@@ -46,7 +46,7 @@ def test_it_begins_as_the_script_and_keeps_the_best(tmp_path: Path) -> None:
 
 def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(tmp_path: Path) -> None:
     train(small(tmp_path / "whole", "cmaes", **EVOLVED), console=quiet())
-    with killed_at(evolution, "write_json", 2):
+    with killed_at(evolution, "write_json", 3):
         train(small(tmp_path / "cut", "cmaes", **EVOLVED), console=quiet())
     shutil.copytree(tmp_path / "cut", tmp_path / "ended")
     resume(tmp_path / "ended", steps=1)

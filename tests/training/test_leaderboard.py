@@ -60,6 +60,7 @@ def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Stand
         ({"version": 99}, "of version 99"),
         ({"seed": 7}, "claims are of seed 2026"),
         *((wrong, "no play has such") for wrong in ({"worlds": -5}, {"low": 0.99}, {"contact_free": 2.5})),
+        ({"worlds": 1000, "low": 0.0, "high": 1.0}, "no play has such"),
         ({"safe_score": "high"}, "could not convert"),
         ({"label": "mine", "policy": "forged_module:Policy"}, "--run-code"),
     ],

@@ -39,6 +39,8 @@ GROUPS: Final = {
 }
 """Commands in the order in which they are met: of each a summary, and the module whose ``main``, or ``:function``,
 takes its arguments."""
+RESUMED: Final = ("train", "tune", "league")
+"""Commands that go on where they were interrupted."""
 COMMANDS: Final = {name: command for group in GROUPS.values() for name, command in group.items()}
 
 
@@ -97,7 +99,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         )
         return run(rest) or 0
     except KeyboardInterrupt:
-        print(f"\nposse {name}: interrupted", file=sys.stderr)
+        resumes = "; the same command resumes it" * (name in RESUMED)
+        print(f"\nposse {name}: interrupted{resumes}", file=sys.stderr)
         return 130
     except Exception as error:
         from posse import DeclarationError, ScenarioError

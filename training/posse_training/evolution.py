@@ -26,7 +26,7 @@ from posse_baselines.learned.features import FEATURES
 from posse_baselines.learned.network import LIMIT
 from posse_baselines.learned.policy import MOTION
 from posse_training.errors import require
-from posse_training.files import hold_settings, intact, write_csv
+from posse_training.files import check_held, intact, write_csv
 from posse_training.provenance import software
 from posse_training.train.display import Display
 from posse_training.train.export import make_card
@@ -49,7 +49,8 @@ def evolve(settings: TrainSettings, folder: Path, display: Display, num_threads:
     from cmaes import SepCMA
 
     s, basis = settings, _basis(settings)
-    hold_settings(folder / SOFTWARE, software("cmaes", "numpy"))  # others draw other candidates
+    check_held(folder / SOFTWARE, versions := software("cmaes", "numpy"))
+    write_json(folder / SOFTWARE, versions)  # others draw other candidates
     state: dict[str, Any] = {"scores": [], "curve": [], "seconds": 0.0}
     if (folder / STATE).is_file():
         with intact(folder / STATE):

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.files import read_json, remove_unfinished, replacing, write_json
+from posse_baselines.files import read_json, remove_unfinished, replacing
 from posse_training.errors import RunFolderError
 
 _LOCK: Final = "lock"
@@ -19,38 +19,33 @@ _LOCK: Final = "lock"
 def locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if missing: no other process can hold it meanwhile.
 
-    The operating system releases the lock when the process ends, however it ends. Unfinished files of a process that
-    was killed are removed. RunFolderError names the process that holds the folder already.
+    A file is the lock; one that a killed process leaves locks nothing. Unfinished files of such a process are removed.
+    RunFolderError names the process that holds the folder already.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a+", encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not os.fstat(file.fileno()).st_nlink:
+                raise OSError  # its holder has just removed it
         except OSError as error:
-            holder = (folder / _LOCK).read_text(encoding="utf-8").strip() or "unknown"
+            file.seek(0)
+            holder = file.read().strip() or "unknown"
             raise RunFolderError(f"process {holder} uses {folder}: wait, stop it, or choose another --out") from error
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
         file.flush()
         remove_unfinished(folder)
-        yield
+        try:
+            yield
+        finally:
+            (folder / _LOCK).unlink(missing_ok=True)
 
 
 def check_new(out: Path) -> None:
     """Raise if a folder is neither new nor empty."""
     if out.exists() and (not out.is_dir() or any(path.name != _LOCK for path in out.iterdir())):
         raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
-
-
-@contextlib.contextmanager
-def held_new(out: Path) -> Iterator[None]:
-    """Hold a folder that is new or empty (:func:`check_new`), as :func:`locked` does; no lock is left in it."""
-    check_new(out)
-    with locked(out):
-        try:
-            yield
-        finally:
-            (out / _LOCK).unlink()
 
 
 @contextlib.contextmanager
@@ -78,14 +73,6 @@ def check_held(
     if other:
         shown = ", ".join(f"{name}={value!r:.60}, not {wanted[name]!r:.60}" for name, value in other.items())
         raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another --out, or remove it")
-
-
-def hold_settings(
-    path: Path, settings: Mapping[str, Any], free: Collection[str] = (), results: Collection[str] = ()
-) -> None:
-    """Write the settings of a run as JSON, unless the run that is there has others; see :func:`check_held`."""
-    check_held(path, settings, free, results)
-    write_json(path, settings)
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:

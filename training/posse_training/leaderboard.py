@@ -22,7 +22,7 @@ from posse_baselines.files import write_atomically
 from posse_baselines.registry import FILES, is_code
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate, played_errors, prepare
-from posse_training.files import held_new
+from posse_training.files import check_new, locked
 from posse_training.provenance import commit
 
 __all__ = ["Standing", "read_standings", "submit", "verify"]
@@ -61,7 +61,8 @@ class Standing:
         check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
         check_label(self.label, self.policy)
         ordered = 0 <= self.low <= self.safe_score <= self.high <= 1
-        if not (ordered and 0 <= self.score <= 1 and 0 <= self.contact_free <= 1 and self.worlds >= 1):
+        narrow = (self.high - self.low) ** 2 * self.worlds <= 6  # numbers in [0, 1] deviate by at most 1/2: about 4
+        if not (ordered and narrow and 0 <= self.score <= 1 and 0 <= self.contact_free <= 1 and self.worlds >= 1):
             others = f"score {self.score}, contact_free {self.contact_free}"
             raise SettingsError(f"no play has such numbers: {self}, {others}")
 
@@ -159,7 +160,8 @@ def submit(
     check_texts(name=label, policy=text)
     check_label(label, text)
     prepare(loaded, get_scenario(scenario), episodes, SEED)  # a family has no standings
-    with held_new(out):
+    check_new(out)
+    with locked(out):
         with played_errors():
             claim = measure(label, text, loaded, scenario, episodes, SEED)
         if is_file:

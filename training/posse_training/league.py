@@ -4,7 +4,6 @@ Everything is kept in the folder, so that the same command resumes a league that
 """
 
 import re
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -26,7 +25,7 @@ from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import check_held, hold_settings, locked, write_csv
+from posse_training.files import check_held, intact, locked, write_csv
 from posse_training.options import Changes, Pairs
 from posse_training.provenance import digests
 from posse_training.train.presets import default_settings
@@ -247,7 +246,8 @@ class League:
             results = self._play(team, target, self.settings.episodes, TEST_SEED, "test")
             path.parent.mkdir(parents=True, exist_ok=True)
             write_json(path, {name: asdict(results.estimate(name)) for name in SCORES})
-        return {name: Estimate(**score) for name, score in read_json(path).items()}
+        with intact(path):
+            return {name: Estimate(**score) for name, score in read_json(path).items()}
 
     def _play(self, team: Member, target: Member, episodes: int, seed: int, split: str) -> Results:
         self.console.print(f"playing {team.label} against {target.label}", markup=False)
@@ -273,7 +273,7 @@ def play_league(settings: LeagueSettings, *, console: Console | None = None) -> 
         if any(found._members(side, settings.generations + 1)[-1].trained for side in (TARGET, TEAM)):
             less = f"generations={settings.generations} is less than {settings.path} has"
             raise SettingsError(f"{less}: raise it, or choose another --out")
-        hold_settings(file, held, _FREE)
+        write_json(file, held)
         found.play()
         write_results(found)
     return found
@@ -365,11 +365,7 @@ def main(arguments: Sequence[str]) -> None:
     """Play a league, and print its matrix."""
     settings = tyro.cli(LeagueSettings, prog="posse league", args=arguments)
     require("training", "torch", "stable_baselines3")
-    try:
-        found = play_league(settings)
-    except KeyboardInterrupt:
-        sys.stderr.write("\nto resume: run the same command again with the same --out\n")
-        raise
+    found = play_league(settings)
     console = Console()
     for table in tables(found):
         console.print(table)

@@ -8,7 +8,6 @@ import contextlib
 import faulthandler
 import hashlib
 import importlib
-import io
 import operator
 import os
 import pickle
@@ -28,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.declarations import users_modules
-from posse_baselines.files import write_atomically
+from posse_baselines.files import replacing
 from posse_baselines.registry import is_code
 from posse_training.errors import ClusterError, PlayError, TimeLimitError, require
 from posse_training.provenance import installed, sources
@@ -85,7 +84,7 @@ def _answer() -> None:
     limit, *call = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
     with os.fdopen(os.dup(1), "wb") as found, Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)  # what a policy prints is no part of the answer
-        # A hanging policy does not outlive a parent that was killed.
+        # If the parent was killed: a policy that hangs ends nevertheless.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         found.write(cloudpickle.dumps(_work(*call)))
         ending = threading.Timer(_GRACE / 3, os._exit, (0,))  # ends threads that a policy left, too
@@ -210,7 +209,6 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
     Each finished shard is a file, where the same jobs find it again after an interruption. The files are removed when
     the context ends without an exception. ``done`` is called after each shard that is done or was found.
     """
-    folders = []
     with connected(ray):
         import ray as cluster
 
@@ -232,10 +230,9 @@ def gathered(jobs: Sequence[Job], ray: bool | str, done: Callable[[], object]) -
                 failed.setdefault(k, result)
             elif k not in failed:
                 parts[k][shard] = result
-                content = io.BytesIO()
-                np.savez(content, allow_pickle=False, **result)
                 folders[k].mkdir(parents=True, exist_ok=True)
-                write_atomically(folders[k] / f"{shard.start}-{shard.stop}.npz", content.getvalue())
+                with replacing(folders[k] / f"{shard.start}-{shard.stop}.npz") as partial:
+                    np.savez(partial, allow_pickle=False, **result)
                 done()
     yield [failed.get(k) or joined([parts[k][shard] for shard in job.shards]) for k, job in enumerate(jobs)]
     for folder in folders:

@@ -28,7 +28,7 @@ from posse_training.evaluation.episodes import Match, play_shard
 from posse_training.evaluation.evaluation import guarded, progress_bar
 from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import Estimate, mean
-from posse_training.files import hold_settings, intact, locked
+from posse_training.files import check_held, intact, locked
 from posse_training.options import Ray
 from posse_training.parallel import all_on_ray, connected
 from posse_training.provenance import commit, digests, software
@@ -155,7 +155,8 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     held |= {"scenario_version": run.scenario.version, **software("cmaes", "numpy")}  # others draw other points
     held |= {"tunables": [list(each) for each in run.tunables], **digests([settings.policy])}
     with connected(settings.ray), locked(folder):
-        hold_settings(folder / "settings.json", held, results=(RESULT,))
+        check_held(file := folder / "settings.json", held, results=(RESULT,))
+        write_json(file, held)
         write_json(folder / RESULT, run.play())
     return folder / RESULT
 

@@ -21,9 +21,7 @@ from posse_training.train.train import train
 from posse_training.train.worlds import make_env
 
 
-def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_rollout_is_learned_from_with_its_own_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     means: list[Any] = []
     ratios: list[Any] = []
     original = PPO.train
@@ -33,9 +31,8 @@ def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
         means.append(normaliser.mean.numpy().copy())
         buffer = self.rollout_buffer
         with torch.no_grad():
-            _, log_prob, _ = self.policy.evaluate_actions(
-                torch.as_tensor(buffer.observations[0]), torch.as_tensor(buffer.actions[0])
-            )
+            seen, done = map(torch.as_tensor, (buffer.observations[0], buffer.actions[0]))
+            _, log_prob, _ = self.policy.evaluate_actions(seen, done)
         ratios.append(np.abs(log_prob.numpy() - buffer.log_probs[0]).max())
         original(self)
 

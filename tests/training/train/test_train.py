@@ -3,10 +3,10 @@
 import csv
 import json
 import os
-import subprocess
-import sys
 import time
+import zipfile
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from tests.support.runs import AGAINST, GUARDED, TARGET, killed_at, numbers, qui
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.commands.train import train_all
-from posse_training.errors import RunFolderError, SettingsError
+from posse_training.errors import RunFolderError
 from posse_training.evaluation import evaluate
 from posse_training.files import locked
 from posse_training.train import checkpoint
@@ -66,8 +66,6 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     assert schedule(0.0) == pytest.approx(schedule(-7.0)) == pytest.approx(1e-4)
     assert steps_made(settings, env.num_envs) == env.num_envs * settings.rollout > 100
     assert [even_minibatch(rows, 2) for rows in (7, 12, 15)] == [7, 2, 3]
-    with pytest.raises(SettingsError, match="1 row is too short to learn from"):
-        even_minibatch(1, 2)
 
 
 def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,30 +143,22 @@ def test_an_interrupted_training_ends_as_an_uninterrupted_one(
     assert_equal(numbers(tmp_path / "whole"), numbers(tmp_path / "cut"))
 
 
-SCRIPT = """
-import json, pathlib, sys
-from posse_training.train import TrainSettings
-from posse_training.train.train import train
-train(TrainSettings.from_dict({**json.loads(sys.argv[1]), "folder": pathlib.Path(sys.argv[2])}))
-"""
-
-
 @pytest.mark.long
 def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
     settings = small(tmp_path / "whole", steps=12_000, evaluate_every=6000, checkpoint_every=800)
     train(settings, console=quiet())
-    folder = tmp_path / "killed"
-    command = [sys.executable, "-c", SCRIPT, json.dumps(settings.to_dict()), str(folder)]
+    settings, folder = replace(settings, folder=tmp_path / "killed"), tmp_path / "killed"
     for target in (800, 4000):
-        running, reached = subprocess.Popen(command), 0
+        running, reached = get_context("spawn").Process(target=train, args=(settings,)), 0
+        running.start()
         while reached < target:
-            assert running.poll() is None
+            assert running.is_alive()
             time.sleep(0.01)
             reached = steps_saved(folder) if (folder / "checkpoint.pt").exists() else 0
         running.kill()
-        running.wait()
+        running.join()
         assert reached <= steps_saved(folder) < settings.steps
-    subprocess.run(command, check=True)
+    train(settings, console=quiet())
     assert_equal(numbers(tmp_path / "whole"), numbers(folder))
 
 
@@ -182,9 +172,14 @@ def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Pa
     with pytest.raises(RunFolderError, match="does not fit"):
         resume(tmp_path)
     path = tmp_path / "checkpoint.pt"
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.raises(RunFolderError, match=r"checkpoint\.pt is damaged"):
-        resume(tmp_path)
+    tensors = (part for part in zipfile.ZipFile(path).infolist() if "/data/" in part.filename)
+    largest = max(tensors, key=lambda part: part.file_size)
+    whole = bytearray(path.read_bytes())
+    whole[largest.header_offset + largest.file_size // 2] ^= 1
+    for damaged in (whole, whole[: len(whole) // 2]):
+        path.write_bytes(damaged)
+        with pytest.raises(RunFolderError, match=r"checkpoint\.pt is damaged"):
+            resume(tmp_path)
     (tmp_path / "settings.json").unlink()
     with pytest.raises(RunFolderError, match=r"has best\.safetensors, but no settings\.json of a run"):
         train(small(tmp_path), console=quiet())
@@ -193,4 +188,4 @@ def test_a_checkpoint_that_is_damaged_or_of_other_settings_is_named(tmp_path: Pa
 def test_a_folder_in_use(tmp_path: Path) -> None:
     with locked(tmp_path), pytest.raises(RunFolderError, match=f"process {os.getpid()} uses"):
         train(small(tmp_path), console=quiet())
-    assert not (tmp_path / "settings.json").exists()
+    assert not [*tmp_path.iterdir()], "no lock, either"

@@ -72,11 +72,7 @@ def main(arguments: Sequence[str]) -> None:
     given = replace(given, reward_weights={**default.reward_weights, **given.reward_weights})
     check_read(given, default)
     require("training", "torch", "stable_baselines3")
-    try:
-        paths = train_all(given.runs, given.ray)
-    except KeyboardInterrupt:
-        print("\nto resume: run the same command again", file=sys.stderr)
-        raise
+    paths = train_all(given.runs, given.ray)
     print("\n".join(map(str, paths)) if len(given.seeds) > 1 else _what_next(paths[0]))
 
 

@@ -5,6 +5,7 @@ new one replaces the last one atomically, so that a whole one exists whenever th
 """
 
 import io
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,6 +52,8 @@ def read_checkpoint(folder: Path) -> State:
     if not path.is_file():
         raise RunFolderError(f"{folder} has no {CHECKPOINT}, which every run but one of cmaes keeps: name another")
     try:
+        if damaged := zipfile.ZipFile(path).testzip():  # torch does not compare the sums that it wrote
+            raise ValueError(damaged)
         state: State = torch.load(path, weights_only=True)
     except Exception as error:  # whatever a damaged file makes torch raise
         raise RunFolderError(

@@ -13,9 +13,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines import load
+from posse_baselines.files import write_json
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.evolution import check_adviser, evolve
-from posse_training.files import check_held, hold_settings, locked, write_csv
+from posse_training.files import check_held, locked, write_csv
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS, EVOLUTION, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
@@ -61,19 +62,18 @@ def train(settings: TrainSettings, *, console: Console | None = None, num_thread
         saved = checkpoint.read_checkpoint(folder) if (folder / checkpoint.CHECKPOINT).exists() else None
         display = Display(settings, console or Console())
         stack.enter_context(display.bar)
+        display.beside = score_beside(settings, display)
         if settings.algorithm == EVOLUTION:
-            hold_settings(folder / SETTINGS, settings.held(), FREE)
-            display.beside = score_beside(settings, display)
+            write_json(folder / SETTINGS, settings.held())
             return evolve(settings, folder, display, num_threads)
         model.set_logger(make_logger(folder, settings))
-        display.beside = score_beside(settings, display)
         run = Run(settings, folder, env, model, display)
         if saved is None:
             run.begin()
         else:
             run.restore(saved)
             display.note(f"resuming {folder} at {model.num_timesteps:,} steps")
-        hold_settings(folder / SETTINGS, settings.held(), FREE)  # now that it can begin
+        write_json(folder / SETTINGS, settings.held())  # now that it can begin
         display.begin(model.num_timesteps, max(model.num_timesteps, steps_made(settings, env.num_envs)))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.

@@ -30,13 +30,7 @@ class Pairing(NamedTuple):
 
 
 def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
-    """Return every scenario with every opponent.
-
-    Raises:
-        SettingsError: An opponent that was trained on validation worlds.
-        PolicyError: An unknown opponent, one that does not move the other side, or one whose memory cannot be saved,
-            as resuming requires.
-    """
+    """Return every scenario with every opponent; PolicyError if its memory cannot be saved, as resuming requires."""
     found: list[Pairing] = []
     for scenario in settings.given:
         if not settings.opponents:
