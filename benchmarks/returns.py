@@ -12,13 +12,11 @@ from posse_training.train.presets import default_settings
 CONTACTS = ("world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target")
 
 
-def correlations(
-    policy_name: str, scenario: str, weights: Mapping[str, float], worlds: int = 300
-) -> tuple[float, float]:
+def correlations(policy_name: str, scenario: str, weights: Mapping[str, float]) -> tuple[float, float]:
     """Return the correlations of the return with the safe score: until the first contact, and of the whole episode."""
     policy = load(policy_name)
     weighted = posse.get_scenario(scenario, message_size=policy.message_size, reward_weights=weights)
-    batch = posse.batch(weighted, worlds, seed=3, split="test")
+    batch = posse.batch(weighted, 300, seed=3, split="test")
     played = rollout(batch, policy, ["rewards", *CONTACTS])
     rewards = played["rewards"][..., : batch.scenario.num_trackers].mean(axis=-1)
     before = np.stack([played[name] for name in CONTACTS]).sum(axis=0)[:-1] == 0

@@ -64,10 +64,8 @@ Looks = Mapping[str, Style]
 
 def looks_of(policies: Iterable[str]) -> Looks:
     """Return the style of each policy, in the order of a legend: planner and bound come last."""
-    colours, markers = (
-        itertools.cycle((BLUE, RED, GREEN, ORANGE, PURPLE, SKY, PINK, GREY)),
-        itertools.cycle("osD^vPX<>"),
-    )
+    colours = itertools.cycle((BLUE, RED, GREEN, ORANGE, PURPLE, SKY, PINK, GREY))
+    markers = itertools.cycle("osD^vPX<>")
     names = list(dict.fromkeys(policies))
     looks = {name: Style(next(colours), next(markers)) for name in names if name != PLANNER}
     if PLANNER in names:

@@ -105,9 +105,7 @@ class PosseEnv(EnvBase):
     def _make_specs(self) -> None:
         worlds, rows, width = self.batch.action_shape
         low, high = (torch.from_numpy(bound).expand(worlds, rows, -1) for bound in self.batch.layout.bounds())
-        observation = Composite(shape=(worlds,))
-        action = Composite(shape=(worlds,))
-        reward = Composite(shape=(worlds,))
+        observation, action, reward = (Composite(shape=(worlds,)) for _ in range(3))
         for group, part in self._rows.items():
             count = len(self.group_map[group])
             observation[group] = Composite(

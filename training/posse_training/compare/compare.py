@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 import tyro
 from rich.console import Console
+from rich.progress import Progress, TaskID
 
 import posse
 from posse import Batch, Family, Scenario, scenario_names
@@ -40,7 +41,7 @@ from posse_training.evaluation.evaluation import (
 )
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import check_new, held_new
+from posse_training.files import check_new, locked
 from posse_training.options import Changes, Ray, words_of
 from posse_training.provenance import commit
 from posse_training.replay import join, record, write_replay
@@ -103,8 +104,7 @@ def compare(settings: CompareSettings, *, console: Console | None = None) -> "Co
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:
         contenders += read_contenders((PLANNER,))
     for policy in (policy for contender in contenders for policy in contender.policies):
-        if not isinstance(policy, str):
-            refuse_trained_split(policy, settings.split)
+        refuse_trained_split(policy, settings.split)
     if settings.target is not None:
         if is_code(settings.target):
             try:
@@ -120,11 +120,11 @@ def compare(settings: CompareSettings, *, console: Console | None = None) -> "Co
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
         if settings.ray is not False:
-            report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
-            stack.enter_context(found.played_on_ray(settings.ray, report))
+            stack.enter_context(found.played_on_ray(bar, task))
             bar.reset(task, total=len(scenarios) * len(contenders))
-        found.folder = _new_folder(settings.out)
-        stack.enter_context(held_new(found.folder))
+        found.folder = settings.out or _new_folder()
+        stack.enter_context(locked(found.folder))
+        check_new(found.folder)  # nor filled since
         for scenario in scenarios:
             found.play(scenario, lambda what: bar.update(task, description=what, advance=1))
         found.write()
@@ -144,11 +144,8 @@ def _checked(settings: CompareSettings) -> list[Scenario | Family]:
     return found
 
 
-def _new_folder(out: Path | None) -> Path:
-    """Return a folder that is made here, so that two comparisons at once have two; or the given one."""
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        return out
+def _new_folder() -> Path:
+    """Return a folder that is made here, so that two comparisons at once have two."""
     k, folder = 1, Path("runs", "compare")
     while True:
         try:
@@ -199,11 +196,8 @@ class Comparison:
         return min(s.episodes, s.planner_episodes) if is_reference else s.episodes
 
     @contextlib.contextmanager
-    def played_on_ray(self, ray: bool | str, progress: Callable[[int, int], object]) -> Iterator[None]:
-        """Play all at once on a Ray cluster; finished shards are kept until the context ends without an exception.
-
-        ``progress`` is called with the number of finished shards and of all.
-        """
+    def played_on_ray(self, bar: Progress, task: TaskID) -> Iterator[None]:
+        """Play all at once on a Ray cluster; finished shards are kept until the context ends without an exception."""
         ready: dict[Key, Evaluation] = {}
         for scenario, contender in itertools.product(self.scenarios, self.contenders):
             for k, policy in enumerate(contender.policies):
@@ -215,8 +209,8 @@ class Comparison:
                         ready[key] = prepare(policy, scenario, self.episodes(contender), time_limit=limit, **self.place)
                 except (PolicyError, *FAILURES) as error:
                     self.played[key] = error
-        total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
-        with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
+        bar.reset(task, total=sum(len(one.shards) for one in ready.values()))
+        with gathered_results(list(ready.values()), self.settings.ray, lambda: bar.advance(task)) as results:
             self.played |= zip(ready, results, strict=True)
             yield
 
@@ -248,8 +242,7 @@ class Comparison:
         if "marl-eval" in s.export:
             write_marl_eval(self.plays, self.folder / "marl-eval.json")
         rows = [{k: asdict(v) if isinstance(v, Estimate) else v for k, v in row.items()} for row in self.rows]
-        about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
-        about["changed"] = s.overrides
+        about: dict[str, Any] = {**self.place, "episodes": s.episodes, "changed": s.overrides}
         about |= {"comparison": rows, "left_out": self.left_out, "failed": self.failed}
         write_json(self.folder / SUMMARY, about)
         if s.figures:
@@ -305,7 +298,7 @@ class Comparison:
         text = report.page(
             self.rows,
             figures.draw(self.folder, self.plays, self.contenders),
-            title=f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
+            title=f"Policies: {len(self.contenders)}, scenarios: {len(self.scenarios)}",
             facts=f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
             baseline=self.reference,
             replays=shown,
@@ -334,7 +327,9 @@ class Comparison:
 def _facts(settings: CompareSettings) -> str:
     target = "" if settings.target is None else f"target {settings.target}, "
     target += "".join(f"{word}, " for word in words_of(settings.overrides))
-    return f"{settings.episodes:,} worlds each, {target}split {settings.split}, seed {settings.seed}"
+    few = PLANNER not in settings.policies and 0 < settings.planner_episodes < settings.episodes
+    fewer = f" (the planner {settings.planner_episodes:,})" if few else ""
+    return f"{settings.episodes:,} worlds each{fewer}, {target}split {settings.split}, seed {settings.seed}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

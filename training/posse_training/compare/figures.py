@@ -19,7 +19,7 @@ from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend,
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",
     "profile": "Share of worlds with at least a safe score.",
-    "learning": "Validation score over the training of the learned teams.",
+    "learning": "Safe score on validation worlds during training.",
     "recovery": "Share of teams that have settled again, by time since their leader broke.",
 }
 """What each figure shows, by the name of its file."""

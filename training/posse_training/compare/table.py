@@ -11,7 +11,7 @@ from rich.text import Text
 
 from posse_baselines.files import write_json
 from posse_training.compare.contenders import Plays
-from posse_training.evaluation.results import Results, block_of
+from posse_training.evaluation.results import block_of
 from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
 
 Row = dict[str, Any]
@@ -95,11 +95,8 @@ def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
     every = [results for found in plays.values() for results in found.results]
     names = [name for name in next(iter(every), ()) if all(np.isfinite(results[name]).all() for results in every)]
     for (scenario, policy), found in plays.items():
-        runs = {f"seed_{k}": _run(results, names) for k, results in enumerate(found.results)}
-        tasks.setdefault(scenario, {})[policy] = runs
+        for k, results in enumerate(found.results):
+            metrics = {name: results[name].tolist() for name in names}
+            run = {"step_0": {"step_count": 0, **metrics}, "absolute_metrics": metrics}
+            tasks.setdefault(scenario, {}).setdefault(policy, {})[f"seed_{k}"] = run
     write_json(path, {"posse": tasks})
-
-
-def _run(results: Results, names: Sequence[str]) -> dict[str, Any]:
-    metrics = {name: results[name].tolist() for name in names}
-    return {"step_0": {"step_count": 0, **metrics}, "absolute_metrics": metrics}

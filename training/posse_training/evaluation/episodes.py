@@ -11,8 +11,8 @@ from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
 
 
-def refuse_trained_split(policy: Policy | Target, split: str) -> None:
-    """Raise if a policy or a target was trained on this split, by its own account."""
+def refuse_trained_split(policy: Any, split: str) -> None:
+    """Raise if a policy or a target was trained on this split, by its own account; a name or ``None`` has none."""
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
         raise SettingsError(

@@ -123,8 +123,7 @@ def prepare(
     loaded = load(policy)
     opponent = None if target is None else load_target(target)
     for player in (loaded, opponent):
-        if player is not None:
-            refuse_trained_split(player, split)
+        refuse_trained_split(player, split)
     scenario = scenario if opponent is None else scenario.replace(target_motion=opponent.motion)
     size = max(scenario.message_size, loaded.message_size)
     scenario = scenario.replace(message_size=size, terminate_on_contact=False)  # scores are of whole episodes

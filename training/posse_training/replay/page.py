@@ -79,9 +79,8 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
         OSError: It could not be written; an old file is unchanged.
     """
     check_page(path := Path(path))
-    text = page(replay)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, text.encode(errors="replace"))  # names of files may be no UTF-8
+    write_atomically(path, page(replay).encode(errors="replace"))  # names of files may be no UTF-8
     return path
 
 

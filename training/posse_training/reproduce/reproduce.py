@@ -52,11 +52,10 @@ def summary(policy: str, run: Trajectory) -> dict[str, Any]:
     """Return the numbers of a policy."""
     times, in_slots = runs.settling_times(run), runs.slot_error(run)[-1] < _IN_SLOT
     known = times[np.isfinite(times)]
-    paper = [model.paper_settling_time for model in MODELS if policy == model.paper_policy]
     return {
         "policy": policy,
         "model": FAMILY[policy].model,
-        "paper_settling_time": paper[0] if paper else None,
+        "paper_settling_time": {m.paper_policy: m.paper_settling_time for m in MODELS}.get(policy),
         "settling_time_quartiles": np.percentile(known, [25, 50, 75]).tolist() if len(known) else [None] * 3,
         "settled": len(known),
         "in_slots": int(in_slots.all(axis=1).sum()),
