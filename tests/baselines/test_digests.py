@@ -47,9 +47,7 @@ def test_a_policy_acts_as_before(name: str) -> None:
     assert before.keys() == now.keys()
     same = {key: np.isclose(now[key], before[key], rtol=1e-3, atol=5e-4) for key in now}
     # Where two choices are level, rounding decides: on another processor a few worlds may go another way.
-    assert np.mean([*same.values()]) >= 0.9, (
-        f"{name} acts otherwise; if that is meant, write digests.json again: {same}"
-    )
+    assert np.mean([*same.values()]) >= 0.9, f"{name} acts otherwise; if meant, write digests.json again: {same}"
 
 
 def test_no_policy_is_forgotten() -> None:

@@ -1,13 +1,11 @@
 """The manual: it documents every public name, loads nothing from elsewhere, fits a phone; and what its pages show."""
 
 import dataclasses
-import fcntl
 import functools
 import html
 import http.server
 import importlib
 import json
-import os
 import re
 import runpy
 import threading
@@ -32,16 +30,10 @@ MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the manual, once for all modules and processes of a run."""
+    """Build the manual."""
     pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    folder, partial = shared / "manual", shared / "manual.partial"
-    with (shared / "manual.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not folder.exists():
-            printed("-m", "mkdocs", "build", "--strict", "-d", partial, NO_MKDOCS_2_WARNING="1")
-            partial.rename(folder)
+    folder = tmp_path_factory.mktemp("manual")
+    printed("-m", "mkdocs", "build", "--strict", "-d", folder, NO_MKDOCS_2_WARNING="1")
     return folder
 
 
@@ -52,14 +44,10 @@ def test_the_manual_is_short() -> None:
     assert sum(len(re.findall(r"\S*\w\S*", text)) for text in texts) <= 15_000
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_every_public_name_is_in_the_reference(site: Path, module: str) -> None:
+def test_every_public_name_and_setting_is_in_the_manual(site: Path) -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in (site / "reference").rglob("*.html"))
-    names = importlib.import_module(module).__all__
-    assert [name for name in names if f'id="{module}.{name}"' not in text] == []
-
-
-def test_every_setting_is_in_the_manual(site: Path) -> None:
+    names = [f"{module}.{name}" for module in MODULES for name in importlib.import_module(module).__all__]
+    assert [name for name in names if f'id="{name}"' not in text] == []
     page = (site / "scenarios" / "index.html").read_text(encoding="utf-8")
     text = html.unescape(re.sub("<.*?>", "", page))
     wanted = [word for name, setting in posse.Scenario.settings().items() for word in (name, setting.meaning)]
@@ -139,7 +127,7 @@ def test_the_speed_benchmark_measures(tmp_path: Path) -> None:
     assert {"machine", "batches", "one_world"} <= figures.keys()
 
 
-ROW = Standing("a team", "a.b:C", False, "smart", 1, 2026, 1000, 0.5, 0.4, 0.6, 0.7, 0.75, "932670c6b288")
+ROW = Standing("a team", "a.b:C", False, "smart", 1, 2026, 1000, 0.5, 0.48, 0.52, 0.7, 0.75, "932670c6b288")
 
 
 @pytest.fixture
@@ -164,11 +152,11 @@ def test_teams_are_ranked_by_the_safe_score(
 ) -> None:
     """Those of the present version and enough worlds."""
     rows: list[dict[str, Any]] = [
-        {"label": "third", "safe_score": 0.45},
-        {"label": "first", "safe_score": 0.55, "seed": 7},
+        {"label": "third", "safe_score": 0.485},
+        {"label": "first", "safe_score": 0.515, "seed": 7},
         {"label": "second"},
-        {"label": "knows", "safe_score": 0.6, "reads_state": True, "worlds": 100},
-        {"label": "slow", "safe_score": 0.58, "policy": "belief-planner", "worlds": 100},
+        {"label": "knows", "safe_score": 0.52, "reads_state": True, "worlds": 100},
+        {"label": "slow", "safe_score": 0.518, "policy": "belief-planner", "worlds": 100},
         *({"label": "unlisted", **change} for change in ({"version": 99}, {"worlds": 999})),
     ]
     path, standings = tmp_path / "standings.csv", hook("standings")

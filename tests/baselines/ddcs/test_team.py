@@ -54,9 +54,7 @@ def test_both_ends_of_each_range_can_be_played() -> None:
 def test_small_robots_do_in_a_small_world_what_large_ones_do_in_a_large_one(scenario: str, name: str) -> None:
     policy, share = load(name), 0.4
     large = posse.get_scenario(scenario, message_size=policy.message_size)
-    lengths = {
-        key: np.asarray(v) * share for key, v in large.to_dict().items() if large.settings()[key].unit[:1] == "m"
-    }
+    lengths = {k: np.asarray(v) * share for k, v in large.to_dict().items() if large.settings()[k].unit[:1] == "m"}
     small = large.replace(**{key: v.tolist() for key, v in lengths.items() if key != "odometry_drift"})
     batch = posse.batch(large, 3, seed=3)
     layout = posse.ObservationLayout(small)
@@ -116,12 +114,10 @@ def test_a_rectangle_is_searched_as_fast_as_a_square_of_its_area() -> None:
     assert rectangle.mean() < square.mean() + 1.0
 
 
-LATE, DRIFTING = {"actuator_lag": 0.5, "command_delay": 3}, {"odometry_drift": 0.05, "heading_drift": 0.01}
+LATE, DRIFT = {"actuator_lag": 0.5, "command_delay": 3}, {"odometry_drift": 0.05, "heading_drift": 0.01}
 
 
-@pytest.mark.parametrize(
-    ("name", "fault"), [("pngl-l-phi", LATE), ("ddcs-distributed", LATE), ("pngl-l-phi", DRIFTING)]
-)
+@pytest.mark.parametrize(("name", "fault"), [("pngl-l-phi", LATE), ("ddcs-distributed", LATE), ("pngl-l-phi", DRIFT)])
 def test_late_commands_and_drifting_poses_cost_the_team_little(name: str, fault: dict[str, Any]) -> None:
     policy = load(name)
     metrics = play(posse.batch("constant", 60, split="train", message_size=policy.message_size, **fault), policy)

@@ -160,9 +160,10 @@ def test_a_team_that_explores_finds_the_target() -> None:
     ones, zeros = np.ones_like(weights[0]), np.zeros_like(weights[0])
     network = Network(zeros, ones, (weights,), (zeros[:2],), "tanh", "clip")
     policy = LearnedPolicy(network, encoding, {}, safeguard=True)
-    found = rollout(posse.batch("search", 100), policy).metrics["detection_time"]
-    assert np.nanmedian(found) < 8.0
-    assert np.isfinite(found).mean() > 0.97
+    found = rollout(posse.batch("search", 100), policy).metrics
+    assert np.nanmedian(found["detection_time"]) < 8.0
+    assert np.isfinite(found["detection_time"]).mean() > 0.97
+    assert found["contact_free"].mean() > 0.9, "behind the safeguard"
 
 
 def in_double_precision(network: Network, rows: FloatArray) -> npt.NDArray[np.float64]:
@@ -200,8 +201,8 @@ def listener(answer: tuple[float, float], kind: str = "features", safeguard: boo
     return LearnedPolicy(network, encoding, {"name": "mine"}, SCRIPT, safeguard)
 
 
-def worlds(count: int = 6) -> posse.Batch:
-    return posse.batch("field", count, message_size=SCRIPT.message_size, horizon=80)
+def worlds() -> posse.Batch:
+    return posse.batch("field", 6, message_size=SCRIPT.message_size, horizon=80)
 
 
 def test_an_adviser_that_its_name_does_not_make_again_is_refused() -> None:

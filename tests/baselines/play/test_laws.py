@@ -164,9 +164,8 @@ def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float)
 @pytest.mark.parametrize(("frame", "rate"), [("leader", 0.25), ("slot-frame", 0.15)])
 def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(frame: str, rate: float) -> None:
     # Figure 6: on a circle the formation turns with its frame, and the follower's centre keeps to its place in it.
-    policy = DDCS(FAMILY["pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized"]).with_settings(
-        follower_frame=frame
-    )
+    family = FAMILY["pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized"]
+    policy = DDCS(family).with_settings(follower_frame=frame)
     for now in team(policy, 0j, seconds=20.0, target=lambda _: (0.8, rate))[-50:]:
         place = complex_of(now.tracker)[0]
         axis = now.psi[0] if frame == "slot-frame" else now.tracker[0, 0, 2]

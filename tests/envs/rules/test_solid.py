@@ -115,9 +115,8 @@ def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:
 )
 def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(motion: str, turn: float, arena: float) -> None:
     """Place the target as trackers can push it, in poses that it would not reach on its own."""
-    batch = posse.batch(
-        "obstacles", 1000, target_motion=motion, target_turn_rate=turn, arena=arena, **{**CROWDED, "num_trackers": 1}
-    )
+    made: dict[str, Any] = {**CROWDED, "num_trackers": 1, "target_motion": motion, "target_turn_rate": turn}
+    batch = posse.batch("obstacles", 1000, arena=arena, **made)
     batch.reset(seed=3)
     rng = np.random.default_rng(3)
     spots, course = tight_spots(batch, rng), np.exp(2j * np.pi * rng.uniform(size=1000))
@@ -175,9 +174,7 @@ def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
     bearing=st.floats(-math.pi, math.pi),
     miss=st.floats(-0.6, 0.6),
 )
-def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
-    speed: float, away: float, bearing: float, miss: float
-) -> None:
+def test_a_fast_robot_stops_at_what_is_in_its_way(speed: float, away: float, bearing: float, miss: float) -> None:
     """Against the intersection of a straight line with a circle."""
     batch = posse.batch(num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5, horizon=30)
     direction = np.exp(1j * bearing)

@@ -53,15 +53,6 @@ def play(batch: posse.Batch, steps: int, team: Team | None = None) -> Played:
     return Played(*map(np.array, zip(*rows, strict=True)))
 
 
-def test_constant_goes_straight_at_its_speed() -> None:
-    batch = posse.batch("constant", 20, **FAR_AWAY)
-    batch.reset(seed=1)
-    places, courses, turns, _ = play(batch, 300)
-    steps = np.arange(301)[:, None]
-    np.testing.assert_allclose(places, places[0] + 0.06 * steps * courses[0], rtol=1e-4, atol=2e-3)
-    assert (np.abs(turns) < 1e-4).all()
-
-
 @pytest.mark.parametrize("limit", [0.3, 1.0, 3.0])
 def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     batch = posse.batch("accelerating", 200, target_turn_rate=limit, **FAR_AWAY)

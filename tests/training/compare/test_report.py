@@ -109,9 +109,8 @@ def test_a_curve_of_no_finite_numbers_is_not_drawn() -> None:
 
 def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     scores = [0.2, 0.4, 0.4, 0.9]
-    figure = figures.profile(
-        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}, LOOKS
-    )
+    plays = {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}
+    figure = figures.profile(plays, LOOKS)
     x, y = line(figure, "pursuit")
     at = dict(zip(np.round(x, 4), y, strict=True))
     for score, expected in ((0.0, 1), (0.2, 1), (0.205, 0.75), (0.4, 0.75), (0.5, 0.25), (1, 0)):
