@@ -25,7 +25,7 @@ from posse.scenarios import Scenario
 from posse.scenarios.scenario import SLACK
 
 _SONAR = (
-    "Distance from its rim to the nearest disc or wall along each beam, from straight ahead to the left; "
+    "Distance from its rim to the nearest disc or wall in the cone of each beam, from straight ahead to the left; "
     "sonar_range if there is none."
 )
 
