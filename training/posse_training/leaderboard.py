@@ -61,7 +61,7 @@ class Standing:
         check_texts(**{name: value for name, value in asdict(self).items() if isinstance(value, str)})
         check_label(self.label, self.policy)
         ordered = 0 <= self.low <= self.safe_score <= self.high <= 1
-        narrow = (self.high - self.low) ** 2 * self.worlds <= 6  # numbers in [0, 1] deviate by at most 1/2: about 4
+        narrow = (self.high - self.low) ** 2 * self.worlds <= 6  # of numbers in [0, 1] about 4 at most
         if not (ordered and narrow and 0 <= self.score <= 1 and 0 <= self.contact_free <= 1 and self.worlds >= 1):
             others = f"score {self.score}, contact_free {self.contact_free}"
             raise SettingsError(f"no play has such numbers: {self}, {others}")

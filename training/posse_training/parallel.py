@@ -84,7 +84,7 @@ def _answer() -> None:
     limit, *call = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
     with os.fdopen(os.dup(1), "wb") as found, Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)  # what a policy prints is no part of the answer
-        # If the parent was killed: a policy that hangs ends nevertheless.
+        # Ends a policy that hangs, also if the parent was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         found.write(cloudpickle.dumps(_work(*call)))
         ending = threading.Timer(_GRACE / 3, os._exit, (0,))  # ends threads that a policy left, too

@@ -146,10 +146,10 @@ class Beliefs(Minds):
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the memory, field by field, as views."""
-        teams, more = self.search.teams, {"newest": self.newest, "age": self.age, **self._told._asdict()}
-        records = {"seen": self._seen, "particles": self._particles, "ways": teams.ways, "plans": teams.plans}
-        held = (parts(name, array) for name, array in (records | more).items())
-        return {**super().arrays(), **self._past.by_name(), **dict(chain(*held))}
+        teams, held = self.search.teams, {"seen": self._seen, "newest": self.newest, "age": self.age}
+        held |= {"particles": self._particles, "ways": teams.ways, "plans": teams.plans, **self._told._asdict()}
+        fields = chain.from_iterable(parts(name, array) for name, array in held.items())
+        return {**super().arrays(), **self._past.by_name(), **dict(fields)}
 
     def plan(self, observations: FloatArray) -> FloatArray:
         """Bring the worlds up to the present by observations (E, N, F); return each tracker's own action, (R, 2)."""

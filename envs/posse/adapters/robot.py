@@ -22,6 +22,7 @@ from posse.scenarios.setting import check_count
 from posse.signals.layout import ObservationLayout
 
 _BARELY_LOSSY: Final = 1e-9  # loss of a radio whose messages a world keeps with their ages
+_ECHO: Final = 0.8  # steps; a fix that team-mates, whose steps begin at other times, tell again seems newer by less
 
 
 class TargetFix(NamedTuple):
@@ -248,23 +249,22 @@ class Robot:
         _check_age(checked.age)
         return checked
 
-    def _when(self, number: int, age: float) -> float | None:
-        """Return when (steps) a pose or fix was measured, at least 0; ``None``: it is no newer one."""
+    def _when(self, number: int, age: float, apart: float = 0.0) -> float | None:
+        """Return when (steps) a pose or fix was measured, at least 0; ``None``: not ``apart`` later than the last."""
         when = self.steps - age / self.scenario.control_step
-        # One fix comes by several team-mates, whose steps begin at other times: it must be newer by most of a step.
-        if when <= self._newest.get(number, -math.inf) + 0.8 * (number == self.number):
+        if when <= self._newest.get(number, -math.inf) + apart:
             return None
         self._newest[number] = when
         return max(0.0, when)
 
     def _take(self, fix: TargetFix) -> None:
         """Take a fix, if it is newer than the last one, as a tracker of a world does."""
-        me, when = self._me, self._when(self.number, fix.age)
+        me, when = self._me, self._when(self.number, fix.age, _ECHO)
         if when is None:
             return
-        # A step after the last fix if both round to the same one: no velocity has been measured within a step.
+        # If it rounds to the step of the last fix, it counts as of the next one: a velocity needs two steps.
         step = max(round(when), min(math.ceil(when - 1e-6), int(me.fix_step) + 1))
-        me.fix_step = min(me.fix_step, step - 1)  # if both are older than the first observation
+        me.fix_step = min(me.fix_step, step - 1)  # where both are older than the first observation
         new = np.zeros(1, BROADCAST)
         new["fix_step"] = step
         _place(new[0].fix, fix.x * self.scale, fix.y * self.scale, fix.heading, "")

@@ -170,6 +170,9 @@ def test_every_slot_can_be_followed_without_reversing(formation: str, motion: st
     s = batch.scenario
     batch.reset(seed=1)
     places, most = slots(s), 0.1 * s.slot_turn_rate
+    np.testing.assert_allclose([complex(*offset) for offset in s.slot_offsets], places, rtol=1e-9, atol=1e-9)
+    apart = np.abs(places[:, None] - places) + np.diag(np.full(8, np.inf))
+    assert apart.min() > 2 * s.tolerance
     turned, rng = 0.0, np.random.default_rng(1)
     for k in range(300):
         if k % 20 == 0:

@@ -124,7 +124,7 @@ def compare(settings: CompareSettings, *, console: Console | None = None) -> "Co
             bar.reset(task, total=len(scenarios) * len(contenders))
         found.folder = settings.out or _new_folder()
         stack.enter_context(locked(found.folder))
-        check_new(found.folder)  # nor filled since
+        check_new(found.folder)  # it may have been filled since
         for scenario in scenarios:
             found.play(scenario, lambda what: bar.update(task, description=what, advance=1))
         found.write()
