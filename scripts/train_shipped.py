@@ -31,7 +31,7 @@ DUEL: Final[dict[str, Any]] = {
 """Opponents of the teams of ``duel``, the evaders with three shares each."""
 AFTER_LEAGUE: Final[dict[str, Any]] = {"steps": 6_000_000, "start": str(LEAGUE.path / "generation-04" / "trackers")}
 """How the one that learned from nothing goes on from the league's last team."""
-FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "duel")
+FROM_NOTHING: Final = ("smart", "radio", "leader-loss", "obstacles", "search", "field", "robots", "duel")
 """Scenarios with a team that learned from nothing, ``learned-SCENARIO``."""
 SCENARIOS: Final = tuple(dict.fromkeys((*CORRECTIONS, *FROM_NOTHING)))
 """Scenarios with a team of their own."""

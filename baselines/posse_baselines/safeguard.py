@@ -6,6 +6,10 @@ passes unchanged. Of the script only the monitoring of the surroundings, the det
 settings that ``ddcs-tuned`` has for the scenario: without a wanted velocity a robot stays where it is, but for what it
 evades.
 
+Where poses drift, the last five numbers of a message, if it has so many, are the layer's own, as those of the script:
+they tell where the robot sees the target, by which team-mates convert its pose to their frames. Without them the layer
+mistakes where team-mates are.
+
 :func:`Safeguard` puts the layer before an environment; :class:`Guard` is the layer itself.
 """
 
@@ -25,28 +29,38 @@ from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import GUARD, decide_all
 from posse_baselines.ddcs.memory import Minds
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.policy import PolicyError, split_agents, stack_agents
 from posse_baselines.tuned import tuned_settings
 
 
 class Guard(Minds):
-    """The safeguard of R ``robots``, by default all trackers, in each of E worlds, and what it remembers of them."""
+    """The safeguard of R ``robots``, by default all trackers, in each of E worlds, and what it remembers of them.
+
+    Attributes:
+        said: How many numbers of a message are the layer's own, the last ones.
+    """
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
         scenario = layout.scenario
         super().__init__(layout, tuned_settings("ddcs-tuned", scenario), num_worlds, robots or scenario.num_trackers)
-        self.team.at["message_size"] = 0  # messages are the learner's own, and not those of the script
+        self.said = MESSAGE_SIZE if scenario.drifts and scenario.message_size >= MESSAGE_SIZE else 0
+        if self.said == 0:
+            self.team.at["message_size"] = 0  # messages are the learner's own
 
     def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
-        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m), or without message, safely.
+        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2) safely.
 
-        Call it once a control step, with its observations (E, R, F). Longer velocities are shortened to the greatest
-        speed. ValueError if the shape is another, or a number is not finite.
+        Numbers of a message may follow a velocity. Call it once a control step, with its observations (E, R, F). Longer
+        velocities are shortened to the greatest speed. ValueError if the shape is another, or a number is not finite.
         """
-        shape = (*self.me.shape, max((2, *np.shape(wanted)[-1:])))
-        actions = as_motions("the array of wanted velocities", wanted, shape, discrete=False).copy()
-        if not np.isfinite(actions).all():
+        most = 2 + self.layout.scenario.message_size
+        shape = (*self.me.shape, min(most, max((2, *np.shape(wanted)[-1:]))))
+        given = as_motions("the array of wanted velocities", wanted, shape, discrete=False)
+        if not np.isfinite(given).all():
             raise ValueError("a wanted velocity is not a finite number")
+        actions = np.zeros((*self.me.shape, most), np.float32)
+        actions[..., : shape[-1]] = given
         self.run(decide_all, GUARD, observations, actions)
         return actions
 
@@ -110,7 +124,8 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         """Advance by one control step with wanted velocities."""
         _check_running(self.get_wrapper_attr("batch"), self.guard)
         motions = self.guard.actions(self._seen, self.get_wrapper_attr("actions_of")(action))
-        observation, *rest = self.env.step(motions.reshape(self.action_space.shape or ()))
+        shape: Any = self.action_space.shape
+        observation, *rest = self.env.step(motions[..., : shape[-1]].reshape(shape))
         self._seen = np.array(observation, ndmin=3)
         return observation, *rest
 

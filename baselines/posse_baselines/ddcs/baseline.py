@@ -186,8 +186,8 @@ def decide(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, 
         out[0], out[1] = own.real / me.max_speed, own.imag / me.max_speed
         return
     execute_safely(team, me, work.discs[: surround(team, me, mates, row, work.discs)], out)
-    if part != GUARD:
-        write_message(team, me, row, out)
+    if team.at.message_size >= MESSAGE_SIZE:
+        write_message(team, me, row, out[len(out) - MESSAGE_SIZE :])
 
 
 @kernel

@@ -15,7 +15,8 @@ from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, v
 from posse_baselines.laws.guidance import UNLIMITED
 
 MESSAGE_SIZE: Final = 5
-"""Task, leader, term, pulse, slot: five small whole numbers; where poses drift, with the target as seen beside them."""
+"""Task, leader, term, pulse, slot: five small whole numbers; where poses drift, with the target as seen beside them.
+They are the last ones of a message."""
 COUNT: Final = 256
 """Terms and pulses count modulo this."""
 
@@ -61,8 +62,8 @@ def is_newer(value: int, old: int) -> bool:
 
 
 @compiled
-def write_message(team: Team, me: Record, row: FloatArray, action: FloatArray) -> None:
-    """Write the message of a tracker into an action (2 + m,).
+def write_message(team: Team, me: Record, row: FloatArray, message: FloatArray) -> None:
+    """Write the message of a tracker (``MESSAGE_SIZE``,).
 
     Where poses drift, with the target as its own sensor measured it: seen or not, position and heading in its own axes.
     """
@@ -70,11 +71,11 @@ def write_message(team: Team, me: Record, row: FloatArray, action: FloatArray) -
     if team.world.drifts != 0 and row[at.target_seen] > 0.0 and row[at.target_range] < _FARTHEST:
         seen, theta = 1.0, angle_of(pair(row, at.target_heading)) / math.pi
         way = scaled(pair(row, at.target_bearing), row[at.target_range] / _FARTHEST)
-    action[2] = encode(me.task, seen)
-    action[3] = encode(me.leader, way.real)
-    action[4] = encode(me.term, way.imag)
-    action[5] = encode(me.pulse, theta)
-    action[6] = encode(me.slot)
+    message[0] = encode(me.task, seen)
+    message[1] = encode(me.leader, way.real)
+    message[2] = encode(me.term, way.imag)
+    message[3] = encode(me.pulse, theta)
+    message[4] = encode(me.slot)
 
 
 @compiled
@@ -227,7 +228,7 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         mate.heading, mate.velocity = heading, scaled(heading, row[at.neighbour_speed + k])
         mate.turn = row[at.neighbour_turn_rate + k]
         if at.message_size >= MESSAGE_SIZE:
-            m, n = at.neighbour_message + k, len(mates)
+            m, n = at.neighbour_message + at.message_size - MESSAGE_SIZE + k, len(mates)
             mate.task, mate.leader = decode(row[m], len(TASKS)), decode(row[m + 1], n)
             mate.term, mate.pulse = decode(row[m + 2], COUNT), decode(row[m + 3], COUNT)
             mate.slot = decode(row[m + 4], n)

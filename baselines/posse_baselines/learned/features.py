@@ -2,7 +2,7 @@
 
 They contain nothing that the observations of an episode lack; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
-slots to trackers. Where fixes are noisy, they are averaged over time.
+slots to trackers. Where fixes or headings are noisy, they are averaged over time.
 
 All vectors are relative to the tracker: x ahead, y to the left (:mod:`posse_baselines.laws.geometry`). A length d is
 scaled to d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
@@ -50,9 +50,9 @@ FEATURES: Final = record_type(
 """The features of one observation, float32 numbers in this order."""
 NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 
-ESTIMATE: Final = record_type(("age", _F), ("place", _C), ("speed", _F))
-"""What a tracker remembers of the target: the age of its fix, s, -1 while it is unknown; where it was, m, and its
-speed, m/s."""
+ESTIMATE: Final = record_type(("age", _F), ("place", _C), ("speed", _F), ("frame", _C))
+"""What a tracker remembers of the target: the age of its fix, s, -1 while it is unknown; where it was, m; its speed,
+m/s; the heading of the slot frame."""
 
 
 Places = npt.NDArray[np.complex64]
@@ -73,6 +73,8 @@ class Known(NamedTuple):
     """Whether of more slots than robots the first is filled at any rate."""
     share: np.float32
     """Of a new fix in the estimate of the target."""
+    trust: np.float32
+    """Share of a new heading in the estimate of the slot frame's."""
     patience: np.float32
     """s; a robot silent for longer is taken for broken."""
 
@@ -94,10 +96,11 @@ def write_features(row: FloatArray, known: Known, estimate: Record, places: Plac
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
-    theta, frame = pair(row, f.target_heading), pair(row, f.target_frame)
+    most = _frame_limit(row, known)
+    theta, frame = _filter_headings(row, known, most, estimate)
     ahead: Any = dot(pair(row, f.target_velocity), theta)  # robots move along their headings, which are less noisy
     velocity, target = _estimate(row, f, theta, max(ahead, ZERO), known.share, estimate)
-    turn, rate = _turn_of_frame(row, known, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
+    turn, rate = _turn_of_frame(row, f, most, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
     frame *= turn
     for s in range(len(slots)):
         place = target + slots[s] * frame
@@ -146,24 +149,47 @@ def _estimate(
 
 
 @compiled
+def _filter_headings(row: FloatArray, known: Known, most: Any, old: Record) -> tuple[complex, complex]:
+    """Return the headings of the target and of the slot frame without most of their common noise; remember the latter.
+
+    Of the slot frame it is known that it turns to the target's heading, by at most ``most`` (rad/s).
+    """
+    f = known.at[0]
+    theta, frame, heading = pair(row, f.target_heading), pair(row, f.target_frame), pair(row, f.heading)
+    if known.trust < ONE and old.age >= ZERO:
+        before = old.frame * heading.conjugate()
+        turn = clip(angle_of(theta * before.conjugate()), -most * row[f.control_step], most * row[f.control_step])
+        error = frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate()
+        back: Any = (known.trust - ONE) * angle_of(error)
+        noise = complex(math.cos(back), math.sin(back))
+        theta, frame = theta * noise, frame * noise
+    old.frame = frame * heading
+    return theta, frame
+
+
+@compiled
 def _turn_to(way: complex, row: FloatArray, f: Record) -> Any:
     """Return the turn rate to a direction, as a share of the greatest."""
     return max(-ONE, min(_TURN_GAIN * angle_of(way) / row[f.max_turn_rate], ONE))
 
 
 @compiled
-def _turn_of_frame(row: FloatArray, known: Known, behind: float) -> tuple[complex, Any]:
-    """Return the turn of the slot frame since the fix, a unit vector, and how fast it turns (rad/s).
-
-    It was ``behind`` the target's heading, to which it turns, at most so fast that the outermost slot is no faster than
-    any tracker.
-    """
+def _frame_limit(row: FloatArray, known: Known) -> Any:
+    """Return how fast the slot frame turns at most (rad/s): the outermost slot has to be no faster than any tracker."""
     f, slots = known.at[0], known.slots
     outermost: Any = _SMALL
     v: Any = length(pair(row, f.target_velocity))
     for s in range(len(slots)):
         outermost = max(outermost, length(slots[s]))
-    most = max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
+    return max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
+
+
+@compiled
+def _turn_of_frame(row: FloatArray, f: Record, most: Any, behind: float) -> tuple[complex, Any]:
+    """Return the turn of the slot frame since the fix, a unit vector, and how fast it turns (rad/s, ``most`` at most).
+
+    It was ``behind`` the target's heading, to which it turns.
+    """
     turn = clip(behind, -most * row[f.target_age], most * row[f.target_age])
     return complex(math.cos(turn), math.sin(turn)), clip((behind - turn) / row[f.control_step], -most, most)
 

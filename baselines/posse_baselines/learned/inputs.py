@@ -22,6 +22,7 @@ from posse_baselines.policy import PolicyError, check_observations
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
 _SHARE: Final = 0.25  # of a new fix in the estimate of the target, where fixes are noisy
+_TRUST: Final = 0.15  # in a new heading of the slot frame, where headings are noisy
 
 
 class EncodedField(NamedTuple):
@@ -142,8 +143,9 @@ class Encoder(OwnArrays):
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > s.sensing_range)
         share = np.float32(_SHARE if s.range_noise > 0.0 or s.bearing_noise > 0.0 else 1.0)
+        trust = np.float32(_TRUST if s.heading_noise > 0.0 else 1.0)
         half, slowest = complex(*s.half_sides), np.float32(min(s.tracker_speeds))
-        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, np.float32(patience_of(s)))
+        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, trust, np.float32(patience_of(s)))
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""

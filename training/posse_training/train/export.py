@@ -50,7 +50,7 @@ def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, floa
         "scenarios": [scenario.to_dict() for scenario in settings.given],
         "trained_splits": ["train"],
         "chosen_on": "validation",
-        "message_size": settings.message_size,
+        "message_size": settings.given[0].message_size,
         "settings": settings.to_dict(),
         "seed": settings.seed,
         "steps": steps,

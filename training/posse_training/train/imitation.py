@@ -129,9 +129,7 @@ def _play_round(
             if slots.guard is not None:
                 own = slots.guard.actions(observations, own)
             # The expert's messages are sent as well: its labels are those of a team of its own.
-            said = actions[..., 2 : 2 + expert.message_size].copy()
-            actions[~by_expert, :, :parts] = own[~by_expert]
-            actions[..., 2 : 2 + expert.message_size] = said
+            actions[~by_expert, :, :2] = own[~by_expert, :, :2]
         observations, reward, terminated, truncated, _ = batch.step(actions)
         inputs.append(x)
         rewards.append(reward.reshape(-1))

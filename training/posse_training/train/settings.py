@@ -11,8 +11,9 @@ import tyro
 
 from posse import Family, Scenario, ScenarioError
 from posse.declarations import Declarations
-from posse.scenarios.family import scenario_or_family
+from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import PolicyError, load
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.fields import number
 from posse_baselines.files import read_json
 from posse_baselines.policies.scripted import SCRIPTED
@@ -179,7 +180,10 @@ class TrainSettings:
             overrides[weights] = self.reward_weights
         sizes: list[dict[str, Any]] = [{"num_trackers": size} for size in self.team_sizes] or [{}]
         names = self.scenario.split(",")
-        return tuple(scenario_or_family(name.strip(), **overrides, **size) for name in names for size in sizes)
+        made = tuple(scenario_or_family(name.strip(), **overrides, **size) for name in names for size in sizes)
+        if self.safeguard and any(next(blocks(each, range(1), 0, "train"))[0].drifts for each in made):
+            made = tuple(each.replace(message_size=self.message_size + MESSAGE_SIZE) for each in made)
+        return made
 
     @property
     def opponents(self) -> dict[str, int]:

@@ -46,7 +46,7 @@ class TeamVecEnv(VecEnv):
     Attributes:
         batches: The batches, in the order of their slots.
         encoding: As given.
-        action_length: Numbers of an action, 2 + m.
+        action_length: Numbers of an action, 2 + m, without those of a message that the safeguard adds.
         size: Numbers of an observation; behind the encoding's is the state.
 
     Raises:
@@ -61,6 +61,8 @@ class TeamVecEnv(VecEnv):
         self.action_length = _action_length(batches)
         seen = [batch.scenario for batch in batches] if see_state else []
         self._groups = [SlotGroup(batch, encoding, seen, safeguard) for batch in batches]
+        self._said = max(0 if group.guard is None else group.guard.said for group in self._groups)
+        self.action_length -= self._said
         self._owners = [batch for batch in batches for _ in range(batch.num_worlds * batch.action_shape[1])]
         self.size = self._groups[0].size
         self._terms: dict[str, list[float]] = {}  # sum over slots and steps, and of how many
@@ -87,6 +89,7 @@ class TeamVecEnv(VecEnv):
         actions = np.asarray(actions)
         if actions.shape != (self.num_envs, self.action_length):
             raise ValueError(f"actions have shape {actions.shape}, wanted {(self.num_envs, self.action_length)}")
+        actions = np.pad(actions, ((0, 0), (0, self._said)))
         parts = np.split(actions, np.cumsum([group.num_slots for group in self._groups])[:-1])
         self._actions = [
             batch.actions_of(part.reshape(batch.action_shape)) for batch, part in zip(self.batches, parts, strict=True)
