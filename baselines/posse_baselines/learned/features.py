@@ -96,12 +96,9 @@ def write_features(row: FloatArray, known: Known, estimate: Record, places: Plac
         out.slot_near, out.slot_far, out.slot_away = way, way, ONE
         out.law_speed, out.law_direction, out.law_turn = ONE, way, _turn_to(way, row, f)
         return
-    most = _frame_limit(row, known)
-    theta, frame = _filter_headings(row, known, most, estimate)
+    theta, frame, rate = _watch_frame(row, known, estimate)
     ahead: Any = dot(pair(row, f.target_velocity), theta)  # robots move along their headings, which are less noisy
     velocity, target = _estimate(row, f, theta, max(ahead, ZERO), known.share, estimate)
-    turn, rate = _turn_of_frame(row, f, most, angle_of(theta * frame.conjugate()))  # slots go on turning after the fix
-    frame *= turn
     for s in range(len(slots)):
         place = target + slots[s] * frame
         more = _OUTSIDE if _is_outside(row, known, place) else ZERO
@@ -149,49 +146,39 @@ def _estimate(
 
 
 @compiled
-def _filter_headings(row: FloatArray, known: Known, most: Any, old: Record) -> tuple[complex, complex]:
-    """Return the headings of the target and of the slot frame without most of their common noise; remember the latter.
-
-    Of the slot frame it is known that it turns to the target's heading, by at most ``most`` (rad/s).
-    """
-    f = known.at[0]
-    theta, frame, heading = pair(row, f.target_heading), pair(row, f.target_frame), pair(row, f.heading)
-    if known.trust < ONE and old.age >= ZERO:
-        before = old.frame * heading.conjugate()
-        turn = clip(angle_of(theta * before.conjugate()), -most * row[f.control_step], most * row[f.control_step])
-        error = frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate()
-        back: Any = (known.trust - ONE) * angle_of(error)
-        noise = complex(math.cos(back), math.sin(back))
-        theta, frame = theta * noise, frame * noise
-    old.frame = frame * heading
-    return theta, frame
-
-
-@compiled
 def _turn_to(way: complex, row: FloatArray, f: Record) -> Any:
     """Return the turn rate to a direction, as a share of the greatest."""
     return max(-ONE, min(_TURN_GAIN * angle_of(way) / row[f.max_turn_rate], ONE))
 
 
 @compiled
-def _frame_limit(row: FloatArray, known: Known) -> Any:
-    """Return how fast the slot frame turns at most (rad/s): the outermost slot has to be no faster than any tracker."""
+def _watch_frame(row: FloatArray, known: Known, old: Record) -> tuple[complex, complex, Any]:
+    """Return the headings of the target and of the slot frame, and how fast the frame turns (rad/s).
+
+    It turns to the target's heading, at most so fast that the outermost slot is no faster than any tracker, and goes on
+    turning after the fix. What noise does to both headings is filtered by that.
+    """
     f, slots = known.at[0], known.slots
     outermost: Any = _SMALL
     v: Any = length(pair(row, f.target_velocity))
     for s in range(len(slots)):
         outermost = max(outermost, length(slots[s]))
-    return max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
-
-
-@compiled
-def _turn_of_frame(row: FloatArray, f: Record, most: Any, behind: float) -> tuple[complex, Any]:
-    """Return the turn of the slot frame since the fix, a unit vector, and how fast it turns (rad/s, ``most`` at most).
-
-    It was ``behind`` the target's heading, to which it turns.
-    """
-    turn = clip(behind, -most * row[f.target_age], most * row[f.target_age])
-    return complex(math.cos(turn), math.sin(turn)), clip((behind - turn) / row[f.control_step], -most, most)
+    most = max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
+    step, age = row[f.control_step], row[f.target_age]
+    theta, frame, heading = pair(row, f.target_heading), pair(row, f.target_frame), pair(row, f.heading)
+    if known.trust < ONE and old.age >= ZERO:
+        before = old.frame * heading.conjugate()
+        is_new = age < old.age + HALF * step
+        reach, gain = (most * step, known.trust) if is_new else (ZERO, ZERO)
+        turn = clip(angle_of(theta * before.conjugate()), -reach, reach)
+        error = angle_of(frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate())
+        back: Any = (gain - ONE) * error
+        noise = complex(math.cos(back), math.sin(back))
+        theta, frame = theta * noise, frame * noise
+    old.frame = frame * heading
+    behind = angle_of(theta * frame.conjugate())
+    turn = clip(behind, -most * age, most * age)
+    return theta, frame * complex(math.cos(turn), math.sin(turn)), clip((behind - turn) / step, -most, most)
 
 
 @compiled
