@@ -37,6 +37,8 @@ def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
 
 LIMITED: dict[str, Any] = {"tracker_acceleration": 1.0, "tracker_turn_acceleration": 4.0}
 CROSSING: dict[str, Any] = {"scenario": "constant", "num_trackers": 4, "start_distance": (2.0, 3.0)}
+# The layer's own messages are the last five numbers.
+DRIFTING: dict[str, Any] = {**CROSSING, "odometry_drift": 0.4, "heading_drift": 0.08, "message_size": 7}
 FAR_WALL: dict[str, Any] = {"scenario": "obstacles", "num_trackers": 3, "arena": 14.0, "num_obstacles": 3}
 
 
@@ -54,14 +56,14 @@ def full_speed(settings: dict[str, Any], safe: bool) -> tuple[float, float]:
         actions = guard.actions(observations, np.stack([wanted.real, wanted.imag], axis=-1).astype(np.float32))
         if not safe:
             turn = np.angle(wanted) / (s.control_step * s.tracker_turn_rates[0])
-            actions = np.stack([2 * np.maximum(wanted.real, 0) - 1, turn], axis=-1).clip(-1, 1)
+            actions[..., :2] = np.stack([2 * np.maximum(wanted.real, 0) - 1, turn], axis=-1).clip(-1, 1)
         observations, *_ = batch.step(actions)
         way += float(batch.state["tracker_speed"].mean()) * s.control_step
     return float((batch.metrics()["contact_free"] == 0).mean()), way
 
 
 @pytest.mark.parametrize(
-    "settings", [CROSSING, CROSSING | LIMITED, FAR_WALL | LIMITED | {"tracker_acceleration": 0.25}]
+    "settings", [CROSSING, CROSSING | LIMITED, DRIFTING, FAR_WALL | LIMITED | {"tracker_acceleration": 0.25}]
 )
 def test_it_keeps_robots_from_each_other_obstacles_and_walls(settings: dict[str, Any]) -> None:
     (bare, far), (safe, way) = full_speed(settings, False), full_speed(settings, True)

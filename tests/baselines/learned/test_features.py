@@ -151,6 +151,25 @@ def test_noisy_fixes_are_averaged_while_robots_drive() -> None:
     assert averaged < 0.6 * raw
 
 
+def test_noisy_headings_are_filtered_by_what_the_slot_frame_can_do() -> None:
+    """Of white noise a share of 0.15 leaves sqrt(0.15 / 1.85); the target drives straight on, mostly out of sight."""
+    batch = posse.batch("constant", 40, seed=1, heading_noise=0.1, sensing_range=6.0, start_distance=(1.0, 3.0))
+    encoder = Encoder(Encoding.of(batch.layout, "features"), batch.layout, 40)
+    observations = batch.reset()
+    for _ in range(200):
+        rows = encoder.encode(observations)
+        observations, *_ = batch.step(np.full(batch.action_shape, (-1.0, 0.5), np.float32))
+    rows, views = encoder.encode(observations), batch.layout.views(observations)
+    assert np.median(views["target_age"]) > 3.0
+    told = (
+        np.ascontiguousarray(rows[:, : encoder.encoding.num_features]).view(FEATURES)["target_velocity"].reshape(40, 5)
+    )
+    true = directions(batch, "world")[:, None] / directions(batch, "tracker")
+    goes = np.abs(told) > 0.1  # it runs into robots, too
+    raw, filtered = (np.std(np.angle(v / true)[goes]) for v in (views["target_heading"] @ [1, 1j], told))
+    assert filtered < 0.4 * raw
+
+
 def test_a_team_that_explores_finds_the_target() -> None:
     """A linear policy that reads nothing but the direction to its slot, or to explore in."""
     encoding = Encoding("features", 0, ())

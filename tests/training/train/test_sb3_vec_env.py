@@ -72,8 +72,9 @@ def test_shortened_episodes_are_in_no_statistics_of_sb3() -> None:
     assert set(lengths) == {HORIZON}
 
 
-def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
-    settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5}
+@pytest.mark.parametrize("drift", [{}, {"odometry_drift": 0.1, "message_size": 6}])  # five are the safeguard's
+def test_behind_the_safeguard_actions_are_wanted_velocities(drift: dict[str, Any]) -> None:
+    settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5, **drift}
     batches = [posse.batch("smart", 1, first_world=e, autoreset="disabled", **settings) for e in range(3)]
     env: Any = TeamVecEnv(batches, Encoding.of(batches[0].layout), safeguard=True)
     bare = posse.batch("smart", 3, autoreset="disabled", **settings)
@@ -84,7 +85,7 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
     for _ in range(2 * HORIZON):
         wanted = draw(env, generator)
         observations, _, dones, _ = env.step(wanted)
-        seen, *_ = bare.step(guard.actions(seen, wanted.reshape(3, 5, 2)))
+        seen, *_ = bare.step(guard.actions(seen, wanted.reshape(3, 5, 3 if drift else 2)))
         if dones.any():
             seen = bare.reset(options={"reset_mask": np.ones(3, np.bool_)})
             guard.restart(np.ones(3, np.bool_))

@@ -34,6 +34,12 @@ def test_the_scenario_decides_on_the_algorithm(scenario: str, algorithm: str) ->
     assert default_settings(scenario, side="target").algorithm == "ppo"
 
 
+def test_where_poses_drift_the_safeguard_adds_its_messages() -> None:
+    for scenario, size in (("robots", 7), ("smart", 2), ("smart,robots", 7)):
+        settings = TrainSettings(scenario=scenario, message_size=2, safeguard=True)
+        assert {given.message_size for given in settings.given} == {size}
+
+
 def test_a_run_holds_the_code_of_its_rules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     text = 'import posse\n\n\n@posse.field("1", 0, 9)\ndef gauge(c):\n    """One."""\n    return 1.0\n'
