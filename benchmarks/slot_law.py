@@ -24,7 +24,7 @@ class SlotLaw(BasePolicy):
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return the actions that carry it out."""
         encoder, guard = memory
-        law = encoder.encode(observations)[:, :NUM_FEATURES].copy().view(FEATURES)
+        law = encoder.encode(observations, guard)[:, :NUM_FEATURES].copy().view(FEATURES)
         wanted = (law["law_speed"] * law["law_direction"]).view("f4").reshape(*observations.shape[:2], 2)
         return guard.actions(observations, wanted), memory
 

@@ -117,7 +117,7 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         seen = check_observations(observations, (worlds, layout.scenario.num_trackers), layout)
         trackers = seen.shape[1]
         if encoder is not None:
-            seen = encoder.encode(seen)
+            seen = encoder.encode(seen, guard)
         rows = seen if self.whole_team else seen.reshape(worlds * trackers, -1)
         if self._normalize is not None:
             rows = np.asarray(self._normalize.normalize_obs(rows))

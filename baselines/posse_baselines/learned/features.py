@@ -2,7 +2,8 @@
 
 They contain nothing that the observations of an episode lack; a network could learn them, but would first have to
 learn the geometry: ranges times directions, the slots from the formation and ψ, and the matching of
-slots to trackers. Where fixes or headings are noisy, they are averaged over time.
+slots to trackers. Where fixes or headings are noisy, they are averaged over time. Where poses drift, those of
+team-mates are converted to the own frame as the safeguard has measured it, or the script.
 
 All vectors are relative to the tracker: x ahead, y to the left (:mod:`posse_baselines.laws.geometry`). A length d is
 scaled to d / (d + scale), which resolves both centimetres near the slot and tens of metres far from it.
@@ -65,8 +66,6 @@ class Known(NamedTuple):
     """Offsets of an observation's fields, an array of one record."""
     slots: Places
     """(N,) in the slot frame, m."""
-    slowest: np.float32
-    """Greatest speed of the slowest tracker, m/s."""
     half: complex
     """Half the width and half the height of the arena, m; infinite on the open plane."""
     first: bool
@@ -75,18 +74,25 @@ class Known(NamedTuple):
     """Of a new fix in the estimate of the target."""
     trust: np.float32
     """Share of a new heading in the estimate of the slot frame's."""
+    slowest: np.float32
+    """Greatest speed of the slowest tracker, m/s."""
+    unit: Any
+    """m; of what is known of team-mates."""
     patience: np.float32
     """s; a robot silent for longer is taken for broken."""
 
 
 @compiled
-def write_features(row: FloatArray, known: Known, estimate: Record, places: Places, work: Work, out: Record) -> None:
+def write_features(
+    row: FloatArray, known: Known, mates: Records, estimate: Record, places: Places, work: Work, out: Record
+) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros, and update the estimate.
 
-    It works in ``places`` (MOST,) and ``work``.
+    ``mates`` (:data:`~posse_baselines.ddcs.memory.MATE`, by number, or none) convert poses. It works in ``places``
+    (MOST,) and ``work``.
     """
     f, slots = known.at[0], known.slots
-    count, working = _gather_team(row, f, known.patience, places)
+    count, working = _gather_team(row, known, mates, places)
     top = row[f.max_speed]
     out.speed = row[f.speed] / top
     if row[f.target_known] <= 0.0:
@@ -169,7 +175,8 @@ def _watch_frame(row: FloatArray, known: Known, old: Record) -> tuple[complex, c
     if known.trust < ONE and old.age >= ZERO:
         before = old.frame * heading.conjugate()
         is_new = age < old.age + HALF * step
-        reach, gain = (most * step, known.trust) if is_new else (ZERO, ZERO)
+        reach: Any = most * step if is_new else ZERO
+        gain: Any = known.trust if is_new else ZERO
         turn = clip(angle_of(theta * before.conjugate()), -reach, reach)
         error = angle_of(frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate())
         back: Any = (gain - ONE) * error
@@ -207,20 +214,25 @@ def _soft(v: complex, scale: np.float32) -> complex:
 
 
 @compiled
-def _gather_team(row: FloatArray, f: Record, patience: np.float32, places: Places) -> tuple[int, int]:
+def _gather_team(row: FloatArray, known: Known, mates: Records, places: Places) -> tuple[int, int]:
     """Write the present positions (m) of the known team, own robot first; return how many, and how many of them work.
 
     Robots silent for longer than the ``patience`` (s) are taken for broken, and come last.
     """
+    f = known.at[0]
     places[0], count, working = 0j, 1, 1
     for silent in (False, True):
         for p in range(f.neighbours):
             place = p * f.stride
-            age = row[f.neighbour_age + place]
-            if row[f.neighbour_number + place] >= ZERO and (age > patience) == silent and count < MOST:
+            age, number = row[f.neighbour_age + place], int(row[f.neighbour_number + place])
+            if number >= 0 and (age > known.patience) == silent and count < MOST:
                 way = scaled(pair(row, f.neighbour_bearing + place), row[f.neighbour_range + place])
-                run = row[f.neighbour_speed + place] * min(age, _OLDEST)
-                places[count] = way + scaled(pair(row, f.neighbour_heading + place), run)
+                heading = pair(row, f.neighbour_heading + place)
+                if number < len(mates):
+                    way += scaled(mates[number].shift * pair(row, f.heading).conjugate(), known.unit)
+                    heading *= complex(math.cos(mates[number].twist), math.sin(mates[number].twist))
+                run: Any = row[f.neighbour_speed + place] * min(age, _OLDEST)
+                places[count] = way + scaled(heading, run)
                 count += 1
         if not silent:
             working = count

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, kernel, over_worlds
-from posse_baselines.ddcs.memory import offsets_of, patience_of
+from posse_baselines.ddcs.memory import MATE, Minds, offsets_of, patience_of, unit_of
 from posse_baselines.laws.steering import work_for, work_of
 from posse_baselines.learned.features import ESTIMATE, FEATURES, MOST, NUM_FEATURES, Known, write_features
 from posse_baselines.policy import PolicyError, check_observations
@@ -22,6 +22,7 @@ from posse_baselines.policy import PolicyError, check_observations
 KINDS: Final = ("plain", "features")
 """The observation; :mod:`posse_baselines.learned.features`, then the observation."""
 _SHARE: Final = 0.25  # of a new fix in the estimate of the target, where fixes are noisy
+_DRIFTING: Final = 0.1  # the same where poses drift: the velocity between two fixes has the noise of odometry
 _TRUST: Final = 0.15  # in a new heading of the slot frame, where headings are noisy
 
 
@@ -142,10 +143,11 @@ class Encoder(OwnArrays):
         slots = np.array([complex(*slot) for slot in s.slot_offsets], np.complex64)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > s.sensing_range)
-        share = np.float32(_SHARE if s.range_noise > 0.0 or s.bearing_noise > 0.0 else 1.0)
-        trust = np.float32(_TRUST if s.heading_noise > 0.0 else 1.0)
-        half, slowest = complex(*s.half_sides), np.float32(min(s.tracker_speeds))
-        self._known = Known(offsets_of(layout), slots, slowest, half, first, share, trust, np.float32(patience_of(s)))
+        noisy = s.range_noise > 0.0 or s.bearing_noise > 0.0
+        share = _DRIFTING if s.drifts else _SHARE if noisy else 1.0
+        trust = _TRUST if s.heading_noise > 0.0 else 1.0
+        numbers = map(np.float32, (share, trust, min(s.tracker_speeds), unit_of(s), patience_of(s)))
+        self._known = Known(offsets_of(layout), slots, complex(*s.half_sides), first, *numbers)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the target in the worlds of a mask (E,), whose episodes restart."""
@@ -155,10 +157,11 @@ class Encoder(OwnArrays):
         """Return what is remembered as arrays (E, R) by name; views, not copies."""
         return {f"target_{name}": self.estimates[name] for name in ESTIMATE.names or ()}
 
-    def encode(self, observations: FloatArray, worlds: Any = ...) -> FloatArray:
+    def encode(self, observations: FloatArray, minds: Minds | None = None, worlds: Any = ...) -> FloatArray:
         """Return observations (worlds, R, F) of all worlds, or of those, as (rows, size).
 
-        Call it once a control step. PolicyError if the observations have another shape.
+        Where poses drift, ``minds``, the memory of the safeguard or of a script, says where team-mates are. Call it
+        once a control step. PolicyError if the observations have another shape.
         """
         robots = self.estimates[worlds].shape
         rows = check_observations(observations, robots, self.layout).reshape(-1, self.layout.size)
@@ -167,9 +170,12 @@ class Encoder(OwnArrays):
         if self.encoding.num_features == 0:
             return read
         features, estimates = np.zeros(len(rows), FEATURES), self.estimates[worlds]
+        mates = np.zeros((len(rows), 0), MATE.dtype)
+        if minds is not None and self.layout.scenario.drifts:
+            mates = minds.mates[worlds].reshape(len(rows), -1)
         works = np.empty((MOST_THREADS, MOST), np.complex64), work_for(len(self._known.slots))
         # The threads share out rows as if each were a world of one tracker.
-        over_worlds(_write_all, (rows, (self._known, *works), estimates.reshape(-1), features), len(rows), 1)
+        over_worlds(_write_all, (rows, (self._known, mates, *works), estimates.reshape(-1), features), len(rows), 1)
         self.estimates[worlds] = estimates
         return np.hstack([features.view(np.float32).reshape(len(rows), self.encoding.num_features), read])
 
@@ -178,7 +184,7 @@ class Encoder(OwnArrays):
 def _write_all(
     rows: FloatArray, given: Any, estimates: Records, features: Records, thread: int, first: int, end: int
 ) -> None:
-    known, places, works = given
+    known, mates, places, works = given
     work = work_of(works, thread)
     for r in range(first, end):
-        write_features(rows[r], known, estimates[r], places[thread], work, features[r])
+        write_features(rows[r], known, mates[r], estimates[r], places[thread], work, features[r])

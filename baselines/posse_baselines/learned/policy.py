@@ -139,7 +139,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         One that moves the target takes (E, 1, F).
         """
         m: _Memory = memory
-        inputs = m.encoder.encode(observations)
+        inputs = m.encoder.encode(observations, m.minds)
         if self.adviser is not None:
             proposals, _ = self.adviser.propose(observations, m.minds)
             inputs = np.concatenate([inputs, proposals.reshape(len(inputs), MOTION)], axis=1)

@@ -242,7 +242,7 @@ class SlotGroup:
 
     def encode(self, raw: FloatArray, worlds: Any = ...) -> FloatArray:
         """Return the observations (slots, size) of all slots, or of those of some worlds; call it once a step."""
-        rows = self._encoder.encode(raw[worlds], worlds)
+        rows = self._encoder.encode(raw[worlds], self.guard, worlds)
         return rows if self._state is None else np.hstack([rows, self._state.read(worlds)])
 
     def _report(
