@@ -4,6 +4,7 @@ from typing import Any
 
 from posse import ObservationLayout
 from posse.numeric import FloatArray
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.features import FEATURES, NUM_FEATURES
 from posse_baselines.policy import BasePolicy
@@ -16,6 +17,7 @@ class SlotLaw(BasePolicy):
     """Wants the velocity of the slot law, or where to look for the target."""
 
     name = "slot-law"
+    message_size = MESSAGE_SIZE  # of the safeguard, where poses drift
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the inputs' memory and the safeguard's."""
@@ -30,5 +32,5 @@ class SlotLaw(BasePolicy):
 
 
 if __name__ == "__main__":
-    for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field", "duel"):
+    for scenario in ("smart", "radio", "search", "leader-loss", "obstacles", "field", "robots", "duel"):
         print(scenario, evaluate(SlotLaw(), scenario, WORLDS, SEED, progress=False).estimate("safe_score"))

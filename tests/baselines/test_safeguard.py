@@ -157,18 +157,6 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
 
 
-def test_messages_of_a_learner_do_not_move_the_safeguard_where_poses_drift() -> None:
-    batch, actions = posse.batch("smart", 4, message_size=5, odometry_drift=0.05, autoreset="disabled"), []
-    for said in (0.0, 1.0):
-        observations, guard, rng = batch.reset(seed=1), Guard(batch.layout, 4), np.random.default_rng(1)
-        for _ in range(100):
-            given = said * rng.random(batch.action_shape)
-            given[..., :2] = batch.layout.views(observations)["target_bearing"]  # where they come near each other
-            observations, *_ = batch.step(guard.actions(observations, given))
-        actions.append(batch.arrays.tracker["x"].copy())
-    np.testing.assert_array_equal(actions[0], actions[1])
-
-
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))

@@ -15,6 +15,7 @@ from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy, Network
 from posse_baselines.learned.features import FEATURES
 from posse_baselines.learned.network import LIMIT
+from posse_baselines.safeguard import Guard
 
 
 def test_names_are_those_of_views() -> None:
@@ -79,6 +80,20 @@ def test_own_slot_is_where_the_state_says(silent: bool) -> None:
     # With a perfect radio all compute the same assignment.
     heard = 4 if silent else 5
     assert all(len(set(row[:heard])) == heard for row in chosen)
+
+
+def test_where_poses_drift_robots_agree_on_slots_by_what_the_safeguard_measured() -> None:
+    batch = posse.batch("constant", 40, odometry_drift=0.4, heading_drift=0.06, message_size=5)
+    encoder = Encoder(Encoding("features", 0, ()), batch.layout, 40)
+    guard, observations = Guard(batch.layout, 40), batch.reset()
+    for _ in range(40):
+        observations, *_ = batch.step(guard.actions(observations, np.zeros((40, 5, 2))))
+    agree = []
+    for minds in (guard, None):
+        features = encoder.encode(observations, minds).view(FEATURES).reshape(40, 5)
+        chosen = away_from_slots(batch, features).argmin(axis=2)
+        agree.append(np.mean([len(set(row)) == 5 for row in chosen]))
+    assert agree[0] > 0.8 > 0.6 > agree[1]
 
 
 def test_slots_go_on_turning_after_the_fix() -> None:
