@@ -86,7 +86,7 @@ def test_where_poses_drift_robots_agree_on_slots_by_what_the_safeguard_measured(
     batch = posse.batch("constant", 40, odometry_drift=0.4, heading_drift=0.06, message_size=5)
     encoder = Encoder(Encoding("features", 0, ()), batch.layout, 40)
     guard, observations = Guard(batch.layout, 40), batch.reset()
-    for _ in range(40):
+    for _ in range(90):
         observations, *_ = batch.step(guard.actions(observations, np.zeros((40, 5, 2))))
     agree = []
     for minds in (guard, None):
