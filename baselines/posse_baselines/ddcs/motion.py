@@ -174,10 +174,7 @@ def pursue(team: Team, me: Record) -> None:
     delta = wrap(guidance.lawful_heading(sigma, constant, wanted_sigma, wanted_theta) - sigma)
     target = vector(me.target_speed, wrap(me.target_theta - sigma))
     if me.task == FLOCKING:
-        wanted_range = length(arm)
-        speed = guidance.maintenance_speed(
-            target, delta, r, wanted_range, frame_rate, settings.range_gain, me.max_speed
-        )
+        speed = guidance.maintenance_speed(target, delta, r, length(arm), frame_rate, settings.range_gain, me.max_speed)
     else:
         # A chase has to close in, whichever side of the target its slot is on.
         speed, delta = float(me.max_speed), clip(delta, -_MOST_DEVIATION, _MOST_DEVIATION)
