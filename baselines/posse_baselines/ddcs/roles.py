@@ -123,21 +123,19 @@ def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     cost[:] = 0.0  # of one that is not there: it takes what is left over
     for j in range(n):
         mate = mates[j]
-        there = j == me.number or mate.there != 0
-        if not there and (team.world.unlisted == 0 or mate.slot < 0):
+        if j != me.number and mate.there == 0:
+            if team.world.unlisted != 0 and mate.slot >= 0:
+                # It has no place in the observation but claimed a slot. If it were still near its
+                # slot, and the slot were near, it would have a place.
+                place = me.target + team.slots[mate.slot] * me.frame
+                if length(place - me.position) < me.horizon - _IN_PLACE:
+                    mate.slot = -1
+                else:
+                    cost[j] = _RESERVED
+                    cost[j, mate.slot] = 0.0
             continue
-        if not there:
-            # It has no place in the observation but claimed a slot. If it were still near its
-            # slot, and the slot were near, it would have a place.
-            place = me.target + team.slots[mate.slot] * me.frame
-            if length(place - me.position) < me.horizon - _IN_PLACE:
-                mate.slot = -1
-                continue
         held, heading = (me.slot, me.heading) if j == me.number else (mate.slot, mate.heading)
         for k in range(n):
-            if not there:
-                cost[j, k] = 0.0 if k == held else _RESERVED
-                continue
             time = slot_cost(team, me, mate.place, heading, k)
             if held == k:
                 time -= _LOYALTY
