@@ -20,7 +20,7 @@ from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse.scenarios.setting import check_count
-from posse_baselines.ddcs import DDCS, Settings
+from posse_baselines.ddcs import DDCS
 from posse_baselines.files import write_atomically
 from posse_baselines.learned.inputs import EncodedField, Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
@@ -56,12 +56,6 @@ class _Memory(NamedTuple):
         return {**self.encoder.arrays(), **({} if self.minds is None else self.minds.arrays())}
 
 
-def _settings_of(name: str) -> Settings | None:
-    """Return the settings of a policy of the package; ``None``: there is none, or it has no settings."""
-    named = SCRIPTED.get(name)
-    return None if named is None else getattr(named(), "settings", None)
-
-
 class LearnedPolicy(OwnArrays, BasePolicy):
     """A learned policy, played from plain numbers.
 
@@ -93,11 +87,13 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Policy | None = None,
         safeguard: bool = False,
     ) -> None:
-        if adviser is not None and not (isinstance(adviser, DDCS) and adviser.settings == _settings_of(adviser.name)):
-            raise PolicyError(
-                f"{adviser.name!r} cannot be an adviser: use a policy of the DDCS by its name, such as ddcs-tuned; the "
-                "file of what is trained holds the name alone"
-            )
+        if adviser is not None:
+            named = SCRIPTED[adviser.name]() if adviser.name in SCRIPTED else None
+            if not (isinstance(adviser, DDCS) and isinstance(named, DDCS) and adviser.settings == named.settings):
+                raise PolicyError(
+                    f"{adviser.name!r} cannot be an adviser: use a policy of the DDCS by its name, such as ddcs-tuned; "
+                    "the file of what is trained holds the name alone"
+                )
         size = encoding.size + (0 if adviser is None else MOTION)
         most = MOTION if adviser is not None else network.outputs  # an adviser sends its own messages
         if network.inputs != size or not MOTION <= network.outputs <= most:
