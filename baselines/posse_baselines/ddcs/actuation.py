@@ -1,13 +1,4 @@
-"""The actuation layer around the safeguard: what is near, ways past it, and commands that are carried out late.
-
-**Surroundings.** The nearby discs of a tracker: known ones, and unexplained echoes of the sonar.
-
-**Detours.** The safeguard looks one and a half seconds ahead. In front of a wide obstacle no small change of
-direction helps, and it slows down. A detour turns the wanted velocity to the edge of what is in the
-way, and keeps to the side that it began with.
-
-**Execution.** Where motion lags, more is commanded; delayed commands are remembered for monitoring.
-"""
+"""The actuation layer around the safeguard: what is near, ways past it, and commands that are carried out late."""
 
 import math
 from typing import Final
@@ -22,9 +13,6 @@ from posse_baselines.laws.safeguard import MOST_TURN, WALLS, put_disc, put_walls
 _EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
 _MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
 _SIDE_KEPT: Final = 1.5  # s
-
-
-# --- surroundings --------------------------------------------------------------------------------
 
 
 @compiled
@@ -50,7 +38,7 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
 
 @compiled
 def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
-    """List the discs that will be near when the command is executed; return their number.
+    """List the discs that will be near when the command is executed, unexplained echoes last; return their number.
 
     With a command delay, echoes are placed relative to the foreseen pose, though measured at the observed one: teams
     scored more with that.
@@ -92,12 +80,12 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
     return count
 
 
-# --- detours -------------------------------------------------------------------------------------
-
-
 @compiled
 def detour(team: Team, me: Record, discs: Records, wanted: complex) -> complex:
-    """Return the wanted velocity (m/s), turned past what stands in its way."""
+    """Return the wanted velocity (m/s), turned to the edge of what stands in its way; a side once taken is kept.
+
+    The safeguard looks 1.5 s ahead: in front of a wide obstacle no small change of direction helps, and it slows down.
+    """
     ahead, clearance = unit(wanted), team.settings.detour
     left = turn_past(discs, clearance, ahead, 1.0)
     if left == 0.0:  # nothing stands in the way
