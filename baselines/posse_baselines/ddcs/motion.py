@@ -25,9 +25,6 @@ _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 _BORDER: Final = 1.5  # push of a border, at most; one as strong as the own heading would stop the robot
 
 
-# --- the guide -----------------------------------------------------------------------------------
-
-
 @compiled
 def follows(team: Team, me: Record, mates: Records) -> bool:
     """Return whether a tracker follows the leader, not the target."""
@@ -77,9 +74,6 @@ def guide_of(team: Team, me: Record, mates: Records) -> Guide:
     return Guide(leads, position, velocity, frame, rate, slot * frame)
 
 
-# --- the tasks -----------------------------------------------------------------------------------
-
-
 @compiled
 def next_task(team: Team, me: Record, guide: Guide) -> int:
     """Return the next task.
@@ -99,9 +93,6 @@ def next_task(team: Team, me: Record, guide: Guide) -> int:
             error = length(guide.position - me.position) - length(guide.arm)
         wanted = FLOCKING if error <= (far if task == FLOCKING else near) else CONVERGING
     return task if settings.forbidden[task, wanted] else wanted
-
-
-# --- the laws ------------------------------------------------------------------------------------
 
 
 @compiled
@@ -201,9 +192,6 @@ def follow(team: Team, me: Record, guide: Guide) -> None:
     )
     speed, omega = formation.held_command(me.wish * me.heading.conjugate(), offset, me.dt)
     me.wish_speed, me.wish_omega = formation.limit_command(me, speed, omega, offset)
-
-
-# --- searching -----------------------------------------------------------------------------------
 
 
 @compiled
