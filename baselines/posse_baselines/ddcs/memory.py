@@ -27,10 +27,6 @@ from posse_baselines.policy import PolicyError, check_observations
 
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_WAITING: Final = 10  # control steps; commands with a longer delay are not foreseen
-
-
-# --- what a team has in common -------------------------------------------------------------------
-
 _FIELDS: Final = (*(field.name for field in FIELDS.of()), "sonar", "neighbour_message")
 _RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
@@ -150,9 +146,6 @@ class Team(NamedTuple):
     """(N,) place of each slot in the slot frame, m."""
     beams: npt.NDArray[np.complex64]
     """(S,) direction of each sonar beam in the robot's own axes."""
-
-
-# --- memory --------------------------------------------------------------------------------------
 
 
 MIND: Final = record(
