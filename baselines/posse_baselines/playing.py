@@ -20,7 +20,6 @@ Array = npt.NDArray[Any]
 
 _STEPS: Final = ("actions", "rewards", "terms", "score", "terminated", "truncated", "annotations")
 _POSES: Final = {"tracker_pose": "tracker", "target_pose": "world"}
-_FRAMES: Final = ("observations", *_POSES)
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class Recorder:
     def __init__(self, batch: Batch, record: str | Iterable[str] = ()) -> None:
         self.batch = batch
         names, state = (record,) if isinstance(record, str) else tuple(record), tuple(batch.state)
-        known = (*_FRAMES, *_STEPS, "state", *state)
+        known = ("observations", *_POSES, *_STEPS, "state", *state)
         for name in names:
             if name not in known:
                 raise ValueError(f"record={name!r} is unknown; names are: {', '.join(known)}")
