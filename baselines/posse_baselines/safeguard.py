@@ -6,9 +6,9 @@ passes unchanged. Of the script only the monitoring of the surroundings, the det
 settings that ``ddcs-tuned`` has for the scenario: without a wanted velocity a robot stays where it is, but for what it
 evades.
 
-Where poses drift, the last five numbers of a message, if it has so many, are the layer's own, as those of the script:
-they tell where the robot sees the target, by which team-mates convert its pose to their frames. Without them the layer
-mistakes where team-mates are.
+Where poses drift, the last five numbers of a message are the layer's own, as those of the script: they tell where the
+robot sees the target, by which team-mates convert its pose to their frames. Without room for them the layer mistakes
+where team-mates are.
 
 :func:`Safeguard` puts the layer before an environment; :class:`Guard` is the layer itself.
 """
@@ -24,7 +24,7 @@ from gymnasium.error import ResetNeeded
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
-from posse import Batch, ObservationLayout
+from posse import Batch, ObservationLayout, Scenario
 from posse.adapters.actions import as_motions
 from posse.numeric import FloatArray
 from posse_baselines.ddcs.baseline import GUARD, decide_all
@@ -65,6 +65,15 @@ class Guard(Minds):
         return actions
 
 
+def check_room(scenario: Scenario) -> None:
+    """Raise PolicyError where poses drift and messages have no room for those of the safeguard."""
+    if scenario.drifts and scenario.num_trackers > 1 and scenario.message_size < MESSAGE_SIZE:
+        raise PolicyError(
+            f"poses of {scenario.name!r} drift, and message_size={scenario.message_size} has no room for the "
+            f"{MESSAGE_SIZE} numbers by which the safeguard finds team-mates: set it to at least that"
+        )
+
+
 def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
     """Return an environment of posse whose actions are wanted velocities, behind the safeguard.
 
@@ -74,7 +83,7 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
 
     Raises:
         PolicyError: Discrete actions, which are no velocities; observations or actions that a wrapper changes; an
-            environment that is guarded already.
+            environment that is guarded already; no room for messages where poses drift.
         TypeError: Something else.
     """
     guarded: Any
@@ -82,11 +91,11 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         guarded, agent, inner = _GuardedParallelEnv, env.possible_agents[0], env.unwrapped
         space, seen = env.action_space(agent), env.observation_space(agent)
         own = inner.action_space(agent), inner.observation_space(agent)
-        twice = hasattr(env, "guard")
+        twice, layout = hasattr(env, "guard"), inner.layout
     elif isinstance(env, gymnasium.Env) and env.has_wrapper_attr("layout"):
         guarded, space, seen = _GuardedEnv, env.action_space, env.observation_space
         own = env.unwrapped.action_space, env.unwrapped.observation_space
-        twice = env.has_wrapper_attr("guard")
+        twice, layout = env.has_wrapper_attr("guard"), env.get_wrapper_attr("layout")
     else:
         raise TypeError(f"{env!r:.80} is neither posse.parallel_env(...) nor a single environment of gymnasium.make")
     if twice:
@@ -95,6 +104,7 @@ def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
         raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
     if (space, seen) != own:
         raise PolicyError("a wrapper changes what the safeguard reads or says: put it round the safeguard instead")
+    check_room(layout.scenario)
     return guarded(env)
 
 

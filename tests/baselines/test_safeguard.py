@@ -160,6 +160,8 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
 def test_invalid_environments_are_not_guarded() -> None:
     with pytest.raises(PolicyError, match="discrete_actions=False"):
         Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))
+    with pytest.raises(PolicyError, match="'robots' drift, and message_size=0 has no room for the 5 numbers"):
+        Safeguard(posse.parallel_env("robots"))
     with pytest.raises(PolicyError, match="put it round the safeguard"):
         Safeguard(gymnasium.wrappers.FlattenObservation(gymnasium.make("posse/Team-v0")))
     for other in (3, gymnasium.make("Pendulum-v1")):

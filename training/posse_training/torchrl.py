@@ -30,7 +30,7 @@ import posse  # noqa: E402
 from posse.adapters.actions import MOTIONS, agent_names, as_motions, single_action_space  # noqa: E402
 from posse.signals.layout import StateLayout  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
-from posse_baselines.safeguard import Guard  # noqa: E402
+from posse_baselines.safeguard import Guard, check_room  # noqa: E402
 
 __all__ = ["PosseEnv"]
 
@@ -65,7 +65,7 @@ class PosseEnv(EnvBase):
 
     Raises:
         TypeError: ``autoreset`` or ``team_policy`` among the settings.
-        PolicyError: ``safeguard`` with discrete actions, which are no velocities.
+        PolicyError: ``safeguard`` with discrete actions, which are no velocities, or without room for its messages.
         ScenarioError: ``discrete_actions`` with messages, which are not discrete.
         ValueError: As :func:`posse.batch`.
     """
@@ -92,6 +92,8 @@ class PosseEnv(EnvBase):
         self._discrete = discrete_actions
         if safeguard and discrete_actions:
             raise PolicyError("discrete actions are no velocities: set safeguard or discrete_actions to False")
+        if safeguard:
+            check_room(self.batch.scenario)
         self._guard = Guard(self.batch.layout, num_worlds) if safeguard else None
         trackers = self.batch.scenario.num_trackers
         names = agent_names(self.batch)

@@ -210,7 +210,6 @@ MATE: Final = record(
     aligned=_I(0),  # 1: has been measured
     shift=_C(0),  # m
     twist=_F(0),  # rad
-    task=_I(-1),
     leader=_I(-1),
     term=_I(-1),
     pulse=_I(-1),

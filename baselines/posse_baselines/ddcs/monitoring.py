@@ -10,7 +10,6 @@ from typing import Final
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team, pair, since
-from posse_baselines.ddcs.settings import TASKS
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, vector, wrap
 from posse_baselines.laws.guidance import UNLIMITED
 
@@ -229,9 +228,8 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         mate.turn = row[at.neighbour_turn_rate + k]
         if at.message_size >= MESSAGE_SIZE:
             m, n = at.neighbour_message + at.message_size - MESSAGE_SIZE + k, len(mates)
-            mate.task, mate.leader = decode(row[m], len(TASKS)), decode(row[m + 1], n)
+            mate.leader, mate.slot = decode(row[m + 1], n), decode(row[m + 4], n)
             mate.term, mate.pulse = decode(row[m + 2], COUNT), decode(row[m + 3], COUNT)
-            mate.slot = decode(row[m + 4], n)
             if team.world.drifts != 0:
                 align(team, me, mate, row, m)
 

@@ -19,7 +19,7 @@ from posse import Batch, PairedBatch, Scenario, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.safeguard import Guard
+from posse_baselines.safeguard import Guard, check_room
 from posse_training.train.world_state import StateReader
 
 _NEVER: Final = -1
@@ -51,7 +51,7 @@ class TeamVecEnv(VecEnv):
 
     Raises:
         ValueError: A batch that resets itself, a target that is an agent, or batches whose actions differ in length.
-        PolicyError: An encoding that does not fit, or a safeguard of a target.
+        PolicyError: An encoding that does not fit; a safeguard of a target, or without room for its messages.
     """
 
     def __init__(
@@ -183,6 +183,8 @@ class SlotGroup:
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
         if safeguard and trackers != batch.scenario.num_trackers:
             raise PolicyError("safeguard=True is for trackers, not for a target moved from outside: leave it out")
+        if safeguard:
+            check_room(batch.scenario)
         self.num_slots = worlds * trackers
         self._encoder = Encoder(encoding, batch.layout, worlds, trackers)
         self._state = StateReader(batch, seen) if seen else None
