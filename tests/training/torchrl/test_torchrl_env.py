@@ -57,11 +57,11 @@ def test_the_state_and_discrete_actions() -> None:
 
 
 def test_steps_equal_those_of_the_batch() -> None:
-    env = PosseEnv("field", WORLDS, seed=5)
-    batch = posse.batch("field", WORLDS, seed=5, autoreset="disabled")
-    first, expected = env.reset(), batch.reset()
-    np.testing.assert_array_equal(first["agents", "observation"].numpy(), expected)
-    carried = first
+    ending: dict[str, Any] = {"seed": 5, "terminate_on_contact": True, "start_distance": (1.0, 3.0)}
+    env = PosseEnv("field", WORLDS, **ending)
+    batch = posse.batch("field", WORLDS, autoreset="disabled", **ending)
+    first = carried = env.reset()
+    np.testing.assert_array_equal(first["agents", "observation"].numpy(), batch.reset())
     for actions in some_actions(batch.action_shape, 40):
         observations, rewards, terminated, truncated, infos = batch.step(actions)
         following, carried = env.step_and_maybe_reset(act(carried, actions))
@@ -71,6 +71,10 @@ def test_steps_equal_those_of_the_batch() -> None:
         np.testing.assert_array_equal(now["terminated"].squeeze(-1).numpy(), terminated)
         np.testing.assert_array_equal(now["truncated"].squeeze(-1).numpy(), truncated)
         np.testing.assert_array_equal(now["score"].squeeze(-1).numpy(), infos["score"])
+        if terminated.any():
+            observations = batch.reset(options={"reset_mask": terminated})
+            np.testing.assert_array_equal(carried["agents", "observation"].numpy(), observations)
+    assert len(set(batch.arrays.world["episode"])) > 1, "of some worlds alone"
     env.batch.arrays.world["score"] = 0.5
     assert not first["score"].any()
 
@@ -94,19 +98,6 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
         PosseEnv("smart", WORLDS, safeguard=True).step(act(carried, wanted))
     with pytest.raises(PolicyError, match="discrete actions are no velocities"):
         PosseEnv("smart", WORLDS, safeguard=True, discrete_actions=True)
-
-
-def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
-    env = PosseEnv("field", WORLDS)
-    carried = env.reset()
-    for actions in some_actions(env.batch.action_shape, 5):
-        _, carried = env.step_and_maybe_reset(act(carried, actions))
-    before = carried["agents", "observation"].clone()
-    marks = torch.tensor([False, True, False, True, True, False])
-    after = env.reset(carried.set("_reset", marks[:, None]))["agents", "observation"]
-    assert torch.equal(after[~marks], before[~marks])
-    assert (after[marks] != before[marks]).flatten(1).any(1).all()
-    assert env.batch.arrays.world["episode"].tolist() == [0, 1, 0, 1, 1, 0]
 
 
 def test_a_seed_is_of_the_next_reset_alone() -> None:
