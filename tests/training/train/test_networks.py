@@ -119,7 +119,7 @@ def test_an_imitated_expert_is_told_of_episodes_that_begin_anew(tmp_path: Path) 
     "algorithm", ["ppo", "mappo", *(pytest.param(name, marks=pytest.mark.long) for name in ("sac", "td3"))]
 )
 def test_what_is_exported_acts_as_the_model_does(tmp_path: Path, algorithm: str) -> None:
-    settings = small(tmp_path, algorithm)
+    settings = small(tmp_path, algorithm, message_size=1)
     train(settings, console=quiet())
     env = make_env(settings)
     model = ALGORITHMS[settings.algorithm].make(settings, env)
@@ -128,5 +128,5 @@ def test_what_is_exported_acts_as_the_model_does(tmp_path: Path, algorithm: str)
     batch = posse.Batch(env.batches[0].scenario, 4, seed=3)
     actions, _ = policy.act(batch.reset(), policy.begin(batch.layout, 4))
     expected, _ = model.predict(env.reset(), deterministic=True)
-    np.testing.assert_allclose(actions.reshape(8, 2), expected, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(actions.reshape(8, 3), expected, rtol=1e-4, atol=1e-4)
     assert np.ptp(expected) > 1e-3
