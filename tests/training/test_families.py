@@ -54,7 +54,6 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
         ({"speed": (0, 1)}, "unknown setting 'speed'"),
         ({"target_speed": (0.7, 0.3)}, "least must not be above the greatest"),
         ({"target_speed": (0.3, 0.4, 0.5)}, "two numbers"),
-        ({"target_speed": (0.3, 2.0)}, "below tracker_speed"),
         ({"target_speed": (0.3, 2.0), **dict.fromkeys(MANY, (1.0, 2.0))}, "below tracker_speed"),
         ({"target_speed": (-1, 0.5)}, "target_speed=-1"),
         ({"num_trackers": (3, 5)}, "need num_neighbours"),
