@@ -133,19 +133,21 @@ def _estimate(
 
     A share of 1 takes the fix as it is.
     """
-    averages = share < ONE and old.age >= ZERO
-    if averages:
-        speed = old.speed + share * (speed - old.speed)
+    step: Any = row[f.control_step]
+    averages, is_new = share < ONE and old.age >= ZERO, row[f.target_age] < old.age + HALF * step
+    if averages and old.speed > ZERO:
+        measures = is_new and length(pair(row, f.target_velocity)) > ZERO  # a fix after a silence has no velocity
+        change: Any = share if measures else ZERO
+        speed = old.speed + change * (speed - old.speed)
     velocity = scaled(theta, speed)
     target = scaled(pair(row, f.target_bearing), row[f.target_range])
     target += scaled(velocity, min(row[f.target_age], _OLDEST))
     position, heading = pair(row, f.position), pair(row, f.heading)
     if averages:
-        step: Any = row[f.control_step]
         guess = (old.place - position) * heading.conjugate() + scaled(velocity, step)
         error = target - guess
         if length(error) < _JUMP:
-            gain: Any = share if row[f.target_age] < old.age + HALF * step else ZERO  # 0: no new fix
+            gain: Any = share if is_new else ZERO
             target = guess + scaled(error, gain)
     old.age, old.place, old.speed = row[f.target_age], position + target * heading, speed
     return velocity, target
@@ -173,10 +175,10 @@ def _watch_frame(row: FloatArray, known: Known, old: Record) -> tuple[complex, c
     step, age = row[f.control_step], row[f.target_age]
     theta, frame, heading = pair(row, f.target_heading), pair(row, f.target_frame), pair(row, f.heading)
     if known.trust < ONE and old.age >= ZERO:
-        before = old.frame * heading.conjugate()
-        is_new = age < old.age + HALF * step
-        reach: Any = most * step if is_new else ZERO
-        gain: Any = known.trust if is_new else ZERO
+        before, since = old.frame * heading.conjugate(), max(ZERO, old.age + step - age)  # s, between the fixes
+        fastest: Any = max(v, old.speed)  # a fix after a silence has no velocity
+        reach: Any = max(ZERO, min(_FRAME_SHARE * (known.slowest - fastest), fastest)) / outermost * since
+        gain: Any = known.trust if since > HALF * step else ZERO
         turn = clip(angle_of(theta * before.conjugate()), -reach, reach)
         error = angle_of(frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate())
         back: Any = (gain - ONE) * error
