@@ -6,9 +6,9 @@ passes unchanged. Of the script only the monitoring of the surroundings, the det
 settings that ``ddcs-tuned`` has for the scenario: without a wanted velocity a robot stays where it is, but for what it
 evades.
 
-Where poses drift, the last five numbers of a message are the layer's own, as those of the script: they tell where the
-robot sees the target, by which team-mates convert its pose to their frames. Without room for them the layer mistakes
-where team-mates are.
+Where poses drift, the last five numbers of a message are the layer's own, whatever an action says there: they tell
+where the robot sees the target, by which team-mates convert its pose. Without room for them the layer mistakes where
+team-mates are. In ``posse/Tracker-v0`` it reads those of the team-mates and sends none.
 
 :func:`Safeguard` puts the layer before an environment; :class:`Guard` is the layer itself.
 """

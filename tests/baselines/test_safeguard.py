@@ -37,8 +37,7 @@ def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
 
 LIMITED: dict[str, Any] = {"tracker_acceleration": 1.0, "tracker_turn_acceleration": 4.0}
 CROSSING: dict[str, Any] = {"scenario": "constant", "num_trackers": 4, "start_distance": (2.0, 3.0)}
-# The layer's own messages are the last five numbers.
-DRIFTING: dict[str, Any] = {**CROSSING, "odometry_drift": 0.4, "heading_drift": 0.08, "message_size": 7}
+DRIFTING = CROSSING | {"odometry_drift": 0.4, "heading_drift": 0.08, "message_size": 7}  # the last five are the layer's
 FAR_WALL: dict[str, Any] = {"scenario": "obstacles", "num_trackers": 3, "arena": 14.0, "num_obstacles": 3}
 
 
@@ -155,6 +154,18 @@ def test_one_tracker_and_a_target_that_is_an_agent() -> None:
         duel.step(actions)
     assert duel.unwrapped.batch.arrays.world["speed"][0] > 0.1, "the target is not guarded"
     assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
+
+
+def test_messages_of_a_learner_do_not_move_the_safeguard_where_poses_drift() -> None:
+    batch, actions = posse.batch("smart", 4, message_size=7, odometry_drift=0.05, autoreset="disabled"), []
+    for said in (0.0, 1.0):
+        observations, guard, rng = batch.reset(seed=1), Guard(batch.layout, 4), np.random.default_rng(1)
+        for _ in range(100):
+            given = said * rng.random(batch.action_shape)
+            given[..., :2] = batch.layout.views(observations)["target_bearing"]  # where they come near each other
+            observations, *_ = batch.step(guard.actions(observations, given))
+        actions.append(batch.arrays.tracker["x"].copy())
+    np.testing.assert_array_equal(actions[0], actions[1])
 
 
 def test_invalid_environments_are_not_guarded() -> None:

@@ -21,7 +21,7 @@ from posse.scenarios.setting import check_count  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.learned import Encoder, Encoding  # noqa: E402
 from posse_baselines.policy import BasePolicy, check_observations  # noqa: E402
-from posse_baselines.safeguard import Guard  # noqa: E402
+from posse_baselines.safeguard import Guard, check_room  # noqa: E402
 from posse_training.train.vec_env import TeamVecEnv  # noqa: E402
 
 __all__ = ["TeamVecEnv", "from_sb3"]
@@ -41,7 +41,8 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
         name: Its name in results; default: the algorithm's.
         message_size: Numbers of a message in the observations that it learned on, 0 in
             ``posse/Solo-v0`` and ``posse/Team-v0`` by default, what the team-mates need in
-            ``posse/Tracker-v0``. A model whose action lacks the message says zeros.
+            ``posse/Tracker-v0``; where poses drift, with the five of the safeguard. A model whose action lacks the
+            message says zeros.
         encoding: How observations were encoded for it, where it learned in ``TeamVecEnv``.
         normalize: The wrapper whose statistics it learned with; default: the model's own, which one from a file lacks.
         safeguard: Whether it learned behind the safeguard, as in ``TeamVecEnv(..., safeguard=True)``.
@@ -99,6 +100,8 @@ class from_sb3(BasePolicy):  # noqa: N801 (used as a function is)
                 "learned with, the scenario its settings, and the model no wrapper that changes observations"
             )
         rows = num_worlds * (1 if self.whole_team else layout.scenario.num_trackers)
+        if self._safeguard:
+            check_room(layout.scenario)
         guard = Guard(layout, num_worlds) if self._safeguard else None
         return layout, num_worlds, encoder, guard, None, np.ones(rows, np.bool_)
 

@@ -19,7 +19,6 @@ from posse import ObservationLayout
 from posse.declarations import unknown
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
-from posse.scenarios.setting import check_count
 from posse_baselines.ddcs import DDCS
 from posse_baselines.files import write_atomically
 from posse_baselines.learned.inputs import EncodedField, Encoder, Encoding
@@ -62,8 +61,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     Args:
         network: Computes the actions.
         encoding: The network's inputs.
-        card: Describes the policy: ``name``, ``side``, ``trained_splits``, ``message_size`` (with the numbers that the
-            safeguard sends), and anything else on record.
+        card: Describes the policy: ``name``, ``side``, ``trained_splits``, ``message_size``, and anything else.
         adviser: Team of the DDCS whose wanted velocity the network corrects, if any (residual policy learning: Silver
             et al. 2018, Johannink et al. 2019). The network reads the velocity as well, and twice its output is added
             to it, before the adviser's safeguard (Alshiekh et al. 2018): zeros give the adviser, and every velocity
@@ -104,7 +102,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         self.network = network
         self.encoding = encoding
         self.adviser = adviser
-        said = check_count("message_size", card.get("message_size", 0), 0) if adviser is None else adviser.message_size
+        said = card.get("message_size", 0) if adviser is None else adviser.message_size
+        if type(said) is not int or said < 0:
+            raise PolicyError(f"message_size={said!r:.80} on its card must be a whole number of at least 0")
         self.message_size = max(network.outputs - MOTION, encoding.message_size, said)
         self.safeguard = safeguard
         self._layers = network.layers()

@@ -166,6 +166,28 @@ def test_noisy_fixes_are_averaged_while_robots_drive() -> None:
     assert averaged < 0.6 * raw
 
 
+def test_after_a_silence_the_speed_is_the_old_one_and_the_slot_frame_the_new_one() -> None:
+    """The target drives straight on, the slot frame is behind its heading; filters are on, noise is next to none."""
+    batch = posse.batch("constant", 8, heading_noise=1e-6, odometry_drift=1e-6)
+    observations = batch.reset()
+    frame = points(batch, "world", "heading_cos", "heading_sin") * np.exp(0.5j)
+    batch.arrays.world["frame_cos"], batch.arrays.world["frame_sin"] = frame.real, frame.imag
+    rest = np.full(batch.action_shape, (-1.0, 0.0))
+    encoder = Encoder(Encoding("features", 0, ()), batch.layout, 8)
+    for step in range(-2, 16):  # from step 1 on, the target is out of sight
+        fresh, *_ = batch.step(rest)
+        observations = fresh if step < 1 else observations
+        views = batch.layout.views(observations)
+        views["target_age"][...] = max(0, step) * batch.scenario.control_step
+        views["target_velocity"][...] *= {-2: 0.0, 1: 0.5}.get(step, 1.0)  # of the first and of the last fix
+        encoder.encode(observations)
+    fresh, *_ = batch.step(rest)
+    batch.layout.views(fresh)["target_velocity"][...] = 0.0
+    features = encoder.encode(fresh).view(FEATURES).reshape(8, 5)
+    np.testing.assert_allclose(np.abs(features["target_velocity"]), batch.scenario.target_speed, rtol=1e-3)
+    np.testing.assert_allclose(away_from_slots(batch, features).min(axis=2), 0, atol=0.01)
+
+
 def test_noisy_headings_are_filtered_by_what_the_slot_frame_can_do() -> None:
     """Of white noise a share of 0.15 leaves sqrt(0.15 / 1.85); the target drives straight on, mostly out of sight."""
     batch = posse.batch("constant", 40, seed=1, heading_noise=0.1, sensing_range=6.0, start_distance=(1.0, 3.0))

@@ -77,8 +77,8 @@ class TrainSettings:
     """Numbers of trackers to train with; default: the scenario's own."""
     num_neighbours: int | None = number(None, "", 0, 4096)
     """Team-mates that the policy reads, nearest first; default: as many as are observed."""
-    message_size: int = number(0, "", 0, 64)
-    """Numbers that a tracker adds to its broadcast in each step."""
+    message_size: int = number(0, "", 0, 64 - MESSAGE_SIZE)
+    """Numbers that a tracker adds to its broadcast in each step; where poses drift, the safeguard adds five more."""
     overrides: Changes = field(default_factory=dict)
     """Settings of the scenario to change, such as target_speed=0.5 or arena=6,4."""
     reward_weights: Pairs = field(default_factory=dict)
