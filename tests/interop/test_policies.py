@@ -81,6 +81,8 @@ def test_encoded_observations_are_played(safeguard: bool) -> None:
     np.testing.assert_allclose(actions, expected, rtol=1e-5, atol=1e-5)
     with pytest.raises(PolicyError, match="learned on observations"):
         acted(from_sb3(model))
+    with pytest.raises(PolicyError, match="has no room"):
+        acted(from_sb3(model, encoding=encoding, safeguard=True), odometry_drift=0.1)
 
 
 def test_a_function_plays_as_a_policy() -> None:

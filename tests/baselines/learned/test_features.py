@@ -88,11 +88,9 @@ def test_where_poses_drift_robots_agree_on_slots_by_what_the_safeguard_measured(
     guard, observations = Guard(batch.layout, 40), batch.reset()
     for _ in range(90):
         observations, *_ = batch.step(guard.actions(observations, np.zeros((40, 5, 2))))
-    agree = []
-    for minds in (guard, None):
-        features = encoder.encode(observations, minds).view(FEATURES).reshape(40, 5)
-        chosen = away_from_slots(batch, features).argmin(axis=2)
-        agree.append(np.mean([len(set(row)) == 5 for row in chosen]))
+    rows = [encoder.encode(observations, minds) for minds in (guard, None)]
+    chosen = [away_from_slots(batch, each.view(FEATURES).reshape(40, 5)).argmin(axis=2) for each in rows]
+    agree = [np.mean([len(set(slots)) == 5 for slots in each]) for each in chosen]
     assert agree[0] > 0.8 > 0.6 > agree[1]
 
 
@@ -172,18 +170,16 @@ def test_after_a_silence_the_speed_is_the_old_one_and_the_slot_frame_the_new_one
     observations = batch.reset()
     frame = points(batch, "world", "heading_cos", "heading_sin") * np.exp(0.5j)
     batch.arrays.world["frame_cos"], batch.arrays.world["frame_sin"] = frame.real, frame.imag
-    rest = np.full(batch.action_shape, (-1.0, 0.0))
     encoder = Encoder(Encoding("features", 0, ()), batch.layout, 8)
-    for step in range(-2, 16):  # from step 1 on, the target is out of sight
-        fresh, *_ = batch.step(rest)
-        observations = fresh if step < 1 else observations
+    for step in range(-2, 17):
+        seen, *_ = batch.step(np.full(batch.action_shape, (-1.0, 0.0)))
+        out_of_sight = 0 < step < 16
+        observations = observations if out_of_sight else seen
         views = batch.layout.views(observations)
-        views["target_age"][...] = max(0, step) * batch.scenario.control_step
-        views["target_velocity"][...] *= {-2: 0.0, 1: 0.5}.get(step, 1.0)  # of the first and of the last fix
-        encoder.encode(observations)
-    fresh, *_ = batch.step(rest)
-    batch.layout.views(fresh)["target_velocity"][...] = 0.0
-    features = encoder.encode(fresh).view(FEATURES).reshape(8, 5)
+        views["target_age"][...] = step * batch.scenario.control_step if out_of_sight else 0.0
+        views["target_velocity"][...] *= {-2: 0.0, 1: 0.5, 16: 0.0}.get(step, 1.0)
+        rows = encoder.encode(observations)
+    features = rows.view(FEATURES).reshape(8, 5)
     np.testing.assert_allclose(np.abs(features["target_velocity"]), batch.scenario.target_speed, rtol=1e-3)
     np.testing.assert_allclose(away_from_slots(batch, features).min(axis=2), 0, atol=0.01)
 
