@@ -35,6 +35,7 @@ _FIRST: Final = 1e3  # m; by so much the first slot counts as nearer where it is
 MOST: Final = 16
 """Robots in a matching at most: the own one and the nearest ones that it knows of."""
 _F, _C = np.float32, np.complex64
+Places = npt.NDArray[np.complex64]
 
 FEATURES: Final = record_type(
     ("speed", _F),  # share of the greatest
@@ -54,9 +55,6 @@ NUM_FEATURES: Final = FEATURES.itemsize // np.dtype(np.float32).itemsize
 ESTIMATE: Final = record_type(("age", _F), ("place", _C), ("speed", _F), ("frame", _C))
 """What a tracker remembers of the target: the age of its fix, s, -1 while it is unknown; where it was, m; its speed,
 m/s; the heading of the slot frame."""
-
-
-Places = npt.NDArray[np.complex64]
 
 
 class Known(NamedTuple):
@@ -88,8 +86,7 @@ def write_features(
 ) -> None:
     """Write the features of one observation (F,) to ``out``, a :data:`FEATURES` of zeros, and update the estimate.
 
-    ``mates`` (:data:`~posse_baselines.ddcs.memory.MATE`, by number, or none) convert poses. It works in ``places``
-    (MOST,) and ``work``.
+    ``mates`` (``MATE`` of the DDCS by number, or none) convert poses. It works in ``places`` (MOST,) and ``work``.
     """
     f, slots = known.at[0], known.slots
     count, working = _gather_team(row, known, mates, places)
@@ -160,24 +157,28 @@ def _turn_to(way: complex, row: FloatArray, f: Record) -> Any:
 
 
 @compiled
+def _frame_limit(known: Known, speed: Any) -> Any:
+    """Return how fast (rad/s) the slot frame of a target turns at most: the outermost slot outruns no tracker."""
+    outermost: Any = _SMALL
+    for s in range(len(known.slots)):
+        outermost = max(outermost, length(known.slots[s]))
+    return max(ZERO, min(_FRAME_SHARE * (known.slowest - speed), speed)) / outermost
+
+
+@compiled
 def _watch_frame(row: FloatArray, known: Known, old: Record) -> tuple[complex, complex, Any]:
     """Return the headings of the target and of the slot frame, and how fast the frame turns (rad/s).
 
-    It turns to the target's heading, at most so fast that the outermost slot is no faster than any tracker, and goes on
-    turning after the fix. What noise does to both headings is filtered by that.
+    It turns to the target's heading at a limited rate, also after the fix: a faster turn is noise of both headings.
     """
-    f, slots = known.at[0], known.slots
-    outermost: Any = _SMALL
-    v: Any = length(pair(row, f.target_velocity))
-    for s in range(len(slots)):
-        outermost = max(outermost, length(slots[s]))
-    most = max(ZERO, min(_FRAME_SHARE * (known.slowest - v), v)) / outermost
+    f = known.at[0]
+    v = length(pair(row, f.target_velocity))
+    most = _frame_limit(known, v)
     step, age = row[f.control_step], row[f.target_age]
     theta, frame, heading = pair(row, f.target_heading), pair(row, f.target_frame), pair(row, f.heading)
     if known.trust < ONE and old.age >= ZERO:
         before, since = old.frame * heading.conjugate(), max(ZERO, old.age + step - age)  # s, between the fixes
-        fastest: Any = max(v, old.speed)  # a fix after a silence has no velocity
-        reach: Any = max(ZERO, min(_FRAME_SHARE * (known.slowest - fastest), fastest)) / outermost * since
+        reach: Any = _frame_limit(known, max(v, old.speed)) * since  # a fix after a silence has no velocity
         gain: Any = known.trust if since > HALF * step else ZERO
         turn = clip(angle_of(theta * before.conjugate()), -reach, reach)
         error = angle_of(frame * (before * complex(math.cos(turn), math.sin(turn))).conjugate())

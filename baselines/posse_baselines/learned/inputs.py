@@ -143,8 +143,7 @@ class Encoder(OwnArrays):
         slots = np.array([complex(*slot) for slot in s.slot_offsets], np.complex64)
         # From the first slot the target is in sight; where it is not from all, that one is filled at any rate.
         first = bool(np.abs(slots).max() > s.sensing_range)
-        noisy = s.range_noise > 0.0 or s.bearing_noise > 0.0
-        share = _DRIFTING if s.drifts else _SHARE if noisy else 1.0
+        share = _DRIFTING if s.drifts else _SHARE if s.range_noise > 0.0 or s.bearing_noise > 0.0 else 1.0
         trust = _TRUST if s.heading_noise > 0.0 else 1.0
         numbers = map(np.float32, (share, trust, min(s.tracker_speeds), unit_of(s), patience_of(s)))
         self._known = Known(offsets_of(layout), slots, complex(*s.half_sides), first, *numbers)

@@ -27,8 +27,9 @@ def test_numba_has_the_inner_parts_that_are_overridden() -> None:
         compiler.Flags: "forceinline no_cpython_wrapper",
         registry.CPUDispatcher: "_numba_type_",
     }
-    lacking = {(part, name) for part in overridden for name in overridden[part].split() if not hasattr(part, name)}
-    assert not lacking, f"numba {numba.__version__} lacks parts that posse.numeric overrides"
+    for part, names in overridden.items():
+        lacking = [f"{part.__name__}.{name}" for name in names.split() if not hasattr(part, name)]
+        assert not lacking, f"numba {numba.__version__} lacks {lacking}, which posse.numeric overrides"
 
 
 @kernel

@@ -122,10 +122,12 @@ def _play_round(
             actions, memory = expert.carry_out(observations, memory, np.zeros_like(velocities))
             wanted = np.concatenate([velocities, actions[..., 2:]], axis=2)
         chosen.append(wanted[:, :, :parts].reshape(-1, parts))
-        with torch.no_grad():
-            own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
-        own = np.clip(own, -1, 1).reshape(-1, trackers, parts)
-        if slots.guard is not None:  # whose memory the inputs read as well
+        own = wanted
+        if not by_expert.all():
+            with torch.no_grad():
+                own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
+            own = np.clip(own, -1, 1).reshape(-1, trackers, parts)
+        if slots.guard is not None:  # the inputs read its memory, from the first round on
             own = slots.guard.actions(observations, own)
         # The messages are the expert's: its labels are those of a team of its own.
         actions[~by_expert, :, :2] = own[~by_expert, :, :2]

@@ -74,7 +74,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
             **pair.inside,
         )
     layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
-    layout = ObservationLayout(layout.scenario.replace(message_size=settings.message_size))  # not others' messages
+    layout = ObservationLayout(layout.scenario.replace(message_size=settings.message_size))  # the learner's alone
     encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
     return TeamVecEnv(
         batches, encoding, safeguard=settings.safeguard, see_state=ALGORITHMS[settings.algorithm].reads_state
